@@ -1,0 +1,1 @@
+"""steplink's service: acceleration from a wearable in, live step counts out."""

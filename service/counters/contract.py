@@ -1,0 +1,105 @@
+"""What every step counter promises, and how its parameters are described.
+
+A counter eats a uniform 50 Hz stream in g, block by block, and gives back the steps that are now certain. Any cutting
+of the stream into blocks gives the same steps, times and state; a snapshot taken after any sample resumes to the same
+result; a block that starts later than the last one ended means a gap: filters start afresh, belief may last, no step
+lies inside it. `latency_s` bounds the time from a step to its confirmation, retrospective credit included.
+`tests/counters/conformance.py` holds every implementation to this.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any, Protocol, TypeVar
+
+from service.errors import ParameterError, SnapshotError
+from service.samples import SampleBlock, Update
+
+Snapshot = dict[str, Any]
+"""Plain data (JSON-able): the counter's name, version, a hash of its parameters and its state."""
+
+
+class StepCounter(Protocol):
+    """A streaming step counter; `name`, `version` and `latency_s` are constants of an instance."""
+
+    @property
+    def name(self) -> str:
+        """The registry's name of the algorithm."""
+
+    @property
+    def latency_s(self) -> float:
+        """The longest time from a step to its confirmation, in seconds of device time."""
+
+    def update(self, block: SampleBlock) -> Update:
+        """Count on over `block`; blocks come in order and do not overlap."""
+
+    def finish(self) -> Update:
+        """End the stream: decide what is still pending."""
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state as plain data."""
+
+    def restore(self, state: Snapshot) -> None:
+        """Take over a snapshot's state; SnapshotError where it is another counter's."""
+
+
+Params = TypeVar("Params")
+
+
+def parameter(default: Any, *, unit: str, low: float, high: float, text: str) -> Any:  # noqa: ANN401
+    """Declare a numeric field of a counter's parameters: its default, unit, range (inclusive) and meaning."""
+    return dataclasses.field(
+        default=default, metadata={"unit": unit, "low": low, "high": high, "text": text}
+    )
+
+
+def choice(default: str, *, options: tuple[str, ...], text: str) -> Any:  # noqa: ANN401
+    """Declare a field of a counter's parameters that takes one of a few words."""
+    return dataclasses.field(default=default, metadata={"options": options, "text": text})
+
+
+def with_overrides(params: Params, overrides: Mapping[str, object]) -> Params:
+    """Return `params` with `overrides` (values or their text), each checked; ParameterError says what is wrong."""
+    fields = {f.name: f for f in dataclasses.fields(params)}  # type: ignore[arg-type]
+    changed: dict[str, object] = {}
+    for name, value in overrides.items():
+        if name not in fields:
+            raise ParameterError(name, value, f"no such parameter; there are {', '.join(sorted(fields))}")
+        changed[name] = _checked(fields[name], value)
+    return dataclasses.replace(params, **changed)  # type: ignore[type-var]
+
+
+def _checked(field: dataclasses.Field[Any], value: object) -> object:
+    options = field.metadata.get("options")
+    if options is not None:
+        if value not in options:
+            raise ParameterError(field.name, value, f"one of {', '.join(options)}")
+        return value
+    low, high, unit = (field.metadata[key] for key in ("low", "high", "unit"))
+    kind = type(field.default)
+    try:
+        number = kind(value)
+    except (TypeError, ValueError):
+        raise ParameterError(field.name, value, f"a number from {low} to {high} {unit}") from None
+    if isinstance(value, float) and kind is int and value != number:
+        raise ParameterError(field.name, value, f"a whole number from {low} to {high} {unit}")
+    if not low <= number <= high:
+        raise ParameterError(field.name, value, f"from {low} to {high} {unit}")
+    return number
+
+
+def params_hash(params: object) -> str:
+    """Return a short hash of a counter's parameters, so that a snapshot fits only the counter that made it."""
+    text = json.dumps(dataclasses.asdict(params), sort_keys=True)  # type: ignore[call-overload]
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def check_snapshot(state: Snapshot, *, name: str, version: int, params: object) -> None:
+    """Raise SnapshotError unless `state` was made by this counter, version and parameters."""
+    wanted = {"counter": name, "version": version, "params": params_hash(params)}
+    for key, value in wanted.items():
+        if state.get(key) != value:
+            raise SnapshotError(f"snapshot has {key} {state.get(key)!r}, this counter {value!r}")

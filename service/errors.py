@@ -1,0 +1,97 @@
+"""Every error steplink raises on purpose; the tree is this page.
+
+    SteplinkError
+    ├── ParameterError      a counter's or command's parameter is unknown, of the wrong type or out of range
+    ├── RecordingError      a file is no recording: wrong shape, missing columns, NaN, an unknown format
+    ├── WireError           bytes from a device that are no valid packet; `reason` says which rule they break
+    ├── SnapshotError       a snapshot of another counter, version or parameters
+    ├── CounterError        a counter cannot be built: unknown name, or a sensor the device lacks
+    ├── LinkError           a link could not be made or was lost; `reason` is a LinkFault
+    └── UnknownDeviceError  no device of that id
+
+Each carries typed fields and a sentence that says what to do. None of them ends a stream: bad input is counted
+and skipped, a lost link is made again.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class SteplinkError(Exception):
+    """Base of every error raised on purpose."""
+
+
+class ParameterError(SteplinkError):
+    """A parameter is unknown, of the wrong type or out of range."""
+
+    def __init__(self, name: str, value: object, why: str) -> None:
+        super().__init__(f"{name} = {value!r}: {why}")
+        self.name = name
+        self.value = value
+        self.why = why
+
+
+class RecordingError(SteplinkError):
+    """A file that cannot be read as a recording."""
+
+    def __init__(self, path: str, why: str) -> None:
+        super().__init__(f"{path}: {why}")
+        self.path = path
+        self.why = why
+
+
+class WireFault(StrEnum):
+    """Which rule of its format a packet breaks."""
+
+    VERSION = "version"
+    LENGTH = "length"
+    VALUE = "value"
+    CHARACTERISTIC = "characteristic"
+    ORDER = "order"
+
+
+class WireError(SteplinkError):
+    """Bytes from a device that are no valid packet."""
+
+    def __init__(self, reason: WireFault, why: str) -> None:
+        super().__init__(f"{reason.value}: {why}")
+        self.reason = reason
+        self.why = why
+
+
+class SnapshotError(SteplinkError):
+    """A snapshot that does not belong to what should restore it."""
+
+
+class CounterError(SteplinkError):
+    """A counter that cannot be built."""
+
+
+class LinkFault(StrEnum):
+    """Why a link could not be made or was lost."""
+
+    NO_ADAPTER = "no_adapter"
+    NOT_FOUND = "not_found"
+    TIMEOUT = "timeout"
+    LOST = "lost"
+    SILENT = "silent"
+    NOT_OURS = "not_ours"
+    REFUSED = "refused"
+
+
+class LinkError(SteplinkError):
+    """A link that could not be made or was lost."""
+
+    def __init__(self, reason: LinkFault, why: str) -> None:
+        super().__init__(why)
+        self.reason = reason
+        self.why = why
+
+
+class UnknownDeviceError(SteplinkError):
+    """No device of that id."""
+
+    def __init__(self, device: str) -> None:
+        super().__init__(f"no device {device!r}: GET /api/v1/devices lists the known ones")
+        self.device = device

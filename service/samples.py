@@ -1,0 +1,196 @@
+"""The vocabulary every room speaks: samples, steps, gaps, events.
+
+Device time is seconds after the device's boot. Sample k of the grid lies at k / GRID_HZ seconds of it. Host time is a
+label added by the session and influences no count. Columns are any indexable of floats: lists while live, float64
+arrays where a whole recording is counted at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+GRID_HZ = 50
+"""Rate every counter runs at: the source documents' own (000 and 003 sample at 50 Hz)."""
+
+TICK_HZ = 1024
+"""Resolution of a device tick; 16 low bits wrap every 64 s."""
+
+TICK_EVERY = 128
+"""A tick is taken at every sample whose index is a multiple of this, so that time does not depend on packet size."""
+
+Columns = tuple[Sequence[float], Sequence[float], Sequence[float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RawBlock:
+    """n samples as a device sent them, at its own rate.
+
+    `index` is that of the first sample since boot (u32, wraps); `tick` is the low 16 bits of the device tick
+    (1/1024 s) at sample `index - index % TICK_EVERY`, None where a device has no clock.
+    """
+
+    boot: int
+    index: int
+    tick: int | None
+    acc_g: Columns
+    gyro_rad_s: Columns | None = None
+    mag_ut: Columns | None = None
+
+    def __len__(self) -> int:
+        return len(self.acc_g[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleBlock:
+    """n consecutive samples of the 50 Hz grid; `start` is the grid index of the first.
+
+    A block that does not start where the last one ended says by that that samples are missing between them.
+    """
+
+    start: int
+    acc_g: Columns
+    gyro_rad_s: Columns | None = None
+    mag_ut: Columns | None = None
+
+    def __len__(self) -> int:
+        return len(self.acc_g[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One counted step.
+
+    `at_s` is device time after boot, the filter's delay removed. `interval_s` is the time since the previous step of
+    the same bout (None for its first). `strength` is peak minus valley in the counter's own unit; `peak`, `valley`,
+    `upper`, `lower` (None where a counter has no such thing) are what decided it, on the counter's filtered signal.
+    """
+
+    at_s: float
+    strength: float
+    interval_s: float | None = None
+    peak: float | None = None
+    valley: float | None = None
+    upper: float | None = None
+    lower: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """Both thresholds in force over a window of device time, for the plot."""
+
+    from_s: float
+    to_s: float
+    upper: float
+    lower: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Update:
+    """What a counter says after a block: steps now certain, how many more are likely, and its view for the plot.
+
+    `trace` holds the filtered signal, one value a sample of the block, the first at device time `trace_from_s`.
+    """
+
+    steps: tuple[Step, ...] = ()
+    pending: int = 0
+    trace_from_s: float = 0.0
+    trace: Sequence[float] = ()
+    bands: tuple[Band, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Packet:
+    """Bytes of one characteristic, as they arrived.
+
+    `at_ns` is host UTC in nanoseconds at arrival: a label, never used for counting.
+    """
+
+    characteristic: str
+    data: bytes
+    at_ns: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceInfo:
+    """What a device says of itself; None until it has said it."""
+
+    device: str | None = None
+    boot: int | None = None
+    rate_hz: float | None = None
+    lsb_per_g: float | None = None
+    battery_percent: int | None = None
+    clock: tuple[int, int] | None = None
+    """(sample index, full tick at that sample): tells the high bits of the tick once a connection."""
+    manufacturer: str | None = None
+    model: str | None = None
+    firmware: str | None = None
+
+
+class Sensor(StrEnum):
+    """What a device can measure."""
+
+    ACCELEROMETER = "accelerometer"
+    GYROSCOPE = "gyroscope"
+    MAGNETOMETER = "magnetometer"
+
+
+# What a Tracker emits. A session adds the device's id, an ordinal to the durable ones, and UTC.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepCounted:
+    """Durable: one confirmed step; `steps` is this counter's count with it."""
+
+    counter: str
+    steps: int
+    step: Step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gap:
+    """Durable: samples that did not arrive. `filled` ones (≤ 0.6 s) were interpolated, others start filters afresh."""
+
+    from_s: float
+    to_s: float
+    index: int
+    samples: int
+    filled: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rebooted:
+    """Durable: the device started again; its device time begins at zero, its count goes on."""
+
+    boot: int
+    previous: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Described:
+    """The device said something of itself (identity, rate, scale, battery)."""
+
+    info: DeviceInfo
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signal:
+    """Ephemeral: the primary counter's filtered signal at 50 Hz from `from_s` on, with thresholds once decided."""
+
+    from_s: float
+    values: Sequence[float]
+    bands: tuple[Band, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counting:
+    """Ephemeral: both counts and cadence; `now_s` is the device time of the newest sample."""
+
+    now_s: float
+    steps: int
+    steps_now: int
+    cadence_spm: float | None
+
+
+Event = StepCounted | Gap | Rebooted | Described | Signal | Counting
