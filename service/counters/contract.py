@@ -51,9 +51,7 @@ Params = TypeVar("Params")
 
 def parameter(default: Any, *, unit: str, low: float, high: float, text: str) -> Any:  # noqa: ANN401
     """Declare a numeric field of a counter's parameters: its default, unit, range (inclusive) and meaning."""
-    return dataclasses.field(
-        default=default, metadata={"unit": unit, "low": low, "high": high, "text": text}
-    )
+    return dataclasses.field(default=default, metadata={"unit": unit, "low": low, "high": high, "text": text})
 
 
 def choice(default: str, *, options: tuple[str, ...], text: str) -> Any:  # noqa: ANN401

@@ -1,0 +1,237 @@
+"""The steplink bracelet: our own service, made so that nothing is counted twice and nothing is lost in silence.
+
+Service `5e9a0001-4b1d-4c0e-8f3a-73746570b001`; all numbers little endian; every value fits MTU 23 (20 bytes).
+
+| characteristic | UUID 5e9aNNNN-… | access | value |
+| --- | --- | --- | --- |
+| data      | 0002 | notify | one packet, below |
+| scale     | 0003 | read   | u16, LSB per g (4096: ±8 g) |
+| rate      | 0004 | read   | u16, samples per second × 100 |
+| boot      | 0005 | read   | u32, number of the boot: one more at each reset, wraps |
+| device id | 0006 | read   | 1–20 bytes of UTF-8, the same for ever |
+| clock     | 0007 | read   | u32 index of a sample (a multiple of 128), u64 tick at it |
+
+| packet at | type | field |
+| --- | --- | --- |
+| 0 | u8  | bits 0–3 version = 1; bit 4: sent again from history; bits 5–7 zero |
+| 1 | u8  | low 8 bits of the boot number |
+| 2 | u32 | index of the first sample since boot; wraps |
+| 6 | u16 | low 16 bits of the tick (1/1024 s since boot) at sample `index − index mod 128` |
+| 8 | n × 3 × i16 | x, y, z of n ≥ 1 samples; n = 2 at MTU 23, 84 at MTU 517 |
+
+The index counts samples, not packets, and the tick is taken at every 128th sample only: so packets of any size say the
+same about the same samples. A value outside i16 is sent as its limit. Beside it stand the standard Battery (180F) and
+Device Information (180A) services.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from service.errors import WireError, WireFault
+from service.samples import TICK_EVERY, DeviceInfo, RawBlock
+from service.wearables.contract import Action, Read, Subscribe, Write
+
+
+def _uuid(number: int) -> str:
+    return f"5e9a{number:04x}-4b1d-4c0e-8f3a-73746570b001"
+
+
+def _sig(number: int) -> str:
+    return f"0000{number:04x}-0000-1000-8000-00805f9b34fb"
+
+
+SERVICE: Final = _uuid(1)
+DATA: Final = _uuid(2)
+SCALE: Final = _uuid(3)
+RATE: Final = _uuid(4)
+BOOT: Final = _uuid(5)
+DEVICE_ID: Final = _uuid(6)
+CLOCK: Final = _uuid(7)
+BATTERY_LEVEL: Final = _sig(0x2A19)
+MANUFACTURER_NAME: Final = _sig(0x2A29)
+MODEL_NUMBER: Final = _sig(0x2A24)
+FIRMWARE_REVISION: Final = _sig(0x2A26)
+
+VERSION: Final = 1
+FLAG_HISTORY: Final = 0x10
+_FLAGS_RESERVED: Final = 0xE0
+ATT_HEADER: Final = 3
+"""Bytes of a notification that are not value: op code and handle."""
+_HEADER: Final = struct.Struct("<BBIH")
+_SAMPLE_BYTES: Final = 6
+_I16_MIN, _I16_MAX = -32768, 32767
+DEFAULT_LSB_PER_G: Final = 4096
+"""±8 g in 16 bits: running on the wrist passes ±4 g."""
+
+
+def samples_per_packet(mtu: int) -> int:
+    """Return how many samples one notification holds at an ATT MTU of `mtu` bytes: 2 at 23, 84 at 517."""
+    return (mtu - ATT_HEADER - _HEADER.size) // _SAMPLE_BYTES
+
+
+def tick_index(index: int) -> int:
+    """Return the index of the sample whose tick a packet that starts at `index` carries."""
+    return index - index % TICK_EVERY
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataPacket:
+    """One packet before encoding; `counts` are (x, y, z) in LSB, saturated to i16 when encoded."""
+
+    boot: int
+    index: int
+    tick: int
+    counts: Sequence[tuple[int, int, int]]
+    history: bool = False
+
+
+def encode(packet: DataPacket) -> bytes:
+    """Return the packet's bytes."""
+    flags = VERSION | (FLAG_HISTORY if packet.history else 0)
+    header = _HEADER.pack(flags, packet.boot & 0xFF, packet.index & 0xFFFFFFFF, packet.tick & 0xFFFF)
+    flat = [min(max(value, _I16_MIN), _I16_MAX) for xyz in packet.counts for value in xyz]
+    return header + struct.pack(f"<{len(flat)}h", *flat)
+
+
+def encode_scale(lsb_per_g: int) -> bytes:
+    """Return the scale characteristic's value; `lsb_per_g` 1…65535."""
+    return struct.pack("<H", lsb_per_g)
+
+
+def encode_rate(rate_hz: float) -> bytes:
+    """Return the rate characteristic's value; `rate_hz` 0.01…655.35."""
+    return struct.pack("<H", round(rate_hz * 100))
+
+
+def encode_boot(boot: int) -> bytes:
+    """Return the boot characteristic's value."""
+    return struct.pack("<I", boot & 0xFFFFFFFF)
+
+
+def encode_clock(index: int, tick: int) -> bytes:
+    """Return the clock characteristic's value: the full tick at sample `index`, a multiple of 128."""
+    return struct.pack("<IQ", index & 0xFFFFFFFF, tick)
+
+
+class Bracelet:
+    """The host's side of the protocol: what to do after connecting, and bytes to samples."""
+
+    services: Sequence[str] = (SERVICE,)
+
+    def __init__(self) -> None:
+        self._lsb_per_g: float | None = None
+        self._boot: int | None = None
+        self._readers: dict[str, Callable[[bytes], RawBlock | DeviceInfo]] = {
+            DATA: self._data,
+            SCALE: self._scale,
+            RATE: _rate,
+            BOOT: self._boot_number,
+            DEVICE_ID: _device_id,
+            CLOCK: _clock,
+            BATTERY_LEVEL: _battery,
+            MANUFACTURER_NAME: lambda data: DeviceInfo(manufacturer=_text(data, MANUFACTURER_NAME)),
+            MODEL_NUMBER: lambda data: DeviceInfo(model=_text(data, MODEL_NUMBER)),
+            FIRMWARE_REVISION: lambda data: DeviceInfo(firmware=_text(data, FIRMWARE_REVISION)),
+        }
+
+    def handshake(self) -> Sequence[Action]:
+        """Read who, how fast and how large; then subscribe. The standard services may be missing."""
+        return (
+            *(Read(characteristic=uuid) for uuid in (DEVICE_ID, BOOT, SCALE, RATE, CLOCK)),
+            *(
+                Read(characteristic=uuid, optional=True)
+                for uuid in (MANUFACTURER_NAME, MODEL_NUMBER, FIRMWARE_REVISION, BATTERY_LEVEL)
+            ),
+            Subscribe(characteristic=BATTERY_LEVEL, optional=True),
+            Subscribe(characteristic=DATA),
+        )
+
+    def feed(self, characteristic: str, data: bytes) -> RawBlock | DeviceInfo | None:
+        """Decode one value; WireError where it breaks the format, None for a characteristic that is not ours."""
+        reader = self._readers.get(characteristic)
+        return None if reader is None else reader(data)
+
+    def history(self, first: int, last: int) -> Sequence[Write]:  # noqa: ARG002
+        """Return nothing: this bracelet keeps no history yet."""
+        return ()
+
+    def _data(self, data: bytes) -> RawBlock:
+        if len(data) < _HEADER.size + _SAMPLE_BYTES or (len(data) - _HEADER.size) % _SAMPLE_BYTES:
+            raise WireError(WireFault.LENGTH, f"a packet of {len(data)} bytes; 8 + 6 n are valid, n ≥ 1")
+        flags, boot_low, index, tick = _HEADER.unpack_from(data)
+        if flags & 0x0F != VERSION or flags & _FLAGS_RESERVED:
+            raise WireError(WireFault.VERSION, f"version and flags {flags:#04x}; this is version {VERSION}")
+        if self._lsb_per_g is None:
+            raise WireError(WireFault.ORDER, "a packet before the scale was read")
+        n = (len(data) - _HEADER.size) // _SAMPLE_BYTES
+        values = struct.unpack_from(f"<{3 * n}h", data, _HEADER.size)
+        scale = self._lsb_per_g
+        x, y, z = ([value / scale for value in values[axis::3]] for axis in range(3))
+        return RawBlock(boot=self._full_boot(boot_low), index=index, tick=tick, acc_g=(x, y, z))
+
+    def _full_boot(self, low: int) -> int:
+        """Return the first boot number from the known one on whose low byte is `low`: boots count upwards."""
+        known = self._boot or 0
+        self._boot = (known + (low - known) % 256) & 0xFFFFFFFF
+        return self._boot
+
+    def _boot_number(self, data: bytes) -> DeviceInfo:
+        (self._boot,) = _fixed("<I", data, BOOT)
+        return DeviceInfo(boot=self._boot)
+
+    def _scale(self, data: bytes) -> DeviceInfo:
+        (lsb_per_g,) = _fixed("<H", data, SCALE)
+        if lsb_per_g == 0:
+            raise WireError(WireFault.VALUE, "a scale of 0 LSB per g")
+        self._lsb_per_g = float(lsb_per_g)
+        return DeviceInfo(lsb_per_g=self._lsb_per_g)
+
+
+def _rate(data: bytes) -> DeviceInfo:
+    (hundredths,) = _fixed("<H", data, RATE)
+    if not 100 <= hundredths <= 40_000:
+        raise WireError(WireFault.VALUE, f"a rate of {hundredths / 100} Hz; 1 to 400 are valid")
+    return DeviceInfo(rate_hz=hundredths / 100)
+
+
+def _clock(data: bytes) -> DeviceInfo:
+    index, tick = _fixed("<IQ", data, CLOCK)
+    if index % TICK_EVERY:
+        raise WireError(WireFault.VALUE, f"a clock at sample {index}, no multiple of {TICK_EVERY}")
+    return DeviceInfo(clock=(index, tick))
+
+
+def _battery(data: bytes) -> DeviceInfo:
+    (percent,) = _fixed("<B", data, BATTERY_LEVEL)
+    if percent > 100:
+        raise WireError(WireFault.VALUE, f"a battery at {percent} %")
+    return DeviceInfo(battery_percent=percent)
+
+
+def _device_id(data: bytes) -> DeviceInfo:
+    text = _text(data, DEVICE_ID)
+    if not 1 <= len(data) <= 20 or not text.isprintable() or "/" in text:
+        raise WireError(
+            WireFault.VALUE, f"a device id of {len(data)} bytes; 1 to 20 printable ones without / are valid"
+        )
+    return DeviceInfo(device=text)
+
+
+def _text(data: bytes, characteristic: str) -> str:
+    try:
+        return data.decode("utf-8").rstrip("\0")
+    except UnicodeDecodeError:
+        raise WireError(WireFault.VALUE, f"{characteristic} is no UTF-8") from None
+
+
+def _fixed(layout: str, data: bytes, characteristic: str) -> tuple[int, ...]:
+    if len(data) != struct.calcsize(layout):
+        raise WireError(
+            WireFault.LENGTH, f"{characteristic}: {len(data)} bytes, not {struct.calcsize(layout)}"
+        )
+    values: tuple[int, ...] = struct.unpack(layout, data)
+    return values
