@@ -77,9 +77,9 @@ def _checked(field: dataclasses.Field[Any], value: object) -> object:
             raise ParameterError(field.name, value, f"one of {', '.join(options)}")
         return value
     low, high, unit = (field.metadata[key] for key in ("low", "high", "unit"))
-    kind = type(field.default)
+    kind: type[int] | type[float] = type(field.default)
     try:
-        number = kind(value)
+        number = kind(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ParameterError(field.name, value, f"a number from {low} to {high} {unit}") from None
     if isinstance(value, float) and kind is int and value != number:

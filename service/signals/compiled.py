@@ -34,7 +34,8 @@ def compiled(kernel: Kernel) -> Kernel:
 
 def _with_compiled_callees(kernel: Kernel) -> Kernel:
     """Copy `kernel` with the plain functions of its own module that it names replaced by compiled ones."""
-    assert isinstance(kernel, types.FunctionType)
+    if not isinstance(kernel, types.FunctionType):
+        raise TypeError(f"{kernel!r} is no plain function")
     scope = dict(kernel.__globals__)
     for name in kernel.__code__.co_names:
         callee = scope.get(name)

@@ -230,8 +230,6 @@ def _text(data: bytes, characteristic: str) -> str:
 
 def _fixed(layout: str, data: bytes, characteristic: str) -> tuple[int, ...]:
     if len(data) != struct.calcsize(layout):
-        raise WireError(
-            WireFault.LENGTH, f"{characteristic}: {len(data)} bytes, not {struct.calcsize(layout)}"
-        )
+        raise WireError(WireFault.LENGTH, f"{characteristic}: {len(data)} bytes, not {struct.calcsize(layout)}")
     values: tuple[int, ...] = struct.unpack(layout, data)
     return values
