@@ -77,16 +77,16 @@ def _checked(field: dataclasses.Field[Any], value: object) -> object:
             raise ParameterError(field.name, value, f"one of {', '.join(options)}")
         return value
     low, high, unit = (field.metadata[key] for key in ("low", "high", "unit"))
-    kind: type[int] | type[float] = type(field.default)
+    whole = isinstance(field.default, int)
     try:
-        number = kind(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+        number = float(str(value))
+    except ValueError:
         raise ParameterError(field.name, value, f"a number from {low} to {high} {unit}") from None
-    if isinstance(value, float) and kind is int and value != number:
+    if whole and number % 1:
         raise ParameterError(field.name, value, f"a whole number from {low} to {high} {unit}")
     if not low <= number <= high:
         raise ParameterError(field.name, value, f"from {low} to {high} {unit}")
-    return number
+    return int(number) if whole else number
 
 
 def params_hash(params: object) -> str:
