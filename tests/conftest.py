@@ -1,0 +1,22 @@
+"""What every test may ask for: the recordings, and what STEPLINK_REQUIRE makes of a missing tool."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def missing(what: str) -> None:
+    """Skip for a missing tool or data set; fail instead where STEPLINK_REQUIRE=all promises that all is there."""
+    if os.environ.get("STEPLINK_REQUIRE") == "all":
+        pytest.fail(f"STEPLINK_REQUIRE=all, but {what}")
+    pytest.skip(what)
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The folder of real recordings that STEPLINK_DATA names."""
+    path = os.environ.get("STEPLINK_DATA")
+    if not path or not Path(path).is_dir():
+        missing("STEPLINK_DATA names no folder of recordings")
+    return Path(path)
