@@ -11,6 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 GRID_HZ = 50
 """Rate every counter runs at: the source documents' own (000 and 003 sample at 50 Hz)."""
 
@@ -20,7 +23,8 @@ TICK_HZ = 1024
 TICK_EVERY = 128
 """A tick is taken at every sample whose index is a multiple of this, so that time does not depend on packet size."""
 
-Columns = tuple[Sequence[float], Sequence[float], Sequence[float]]
+Column = Sequence[float] | NDArray[np.float64]
+Columns = tuple[Column, Column, Column]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,9 +145,10 @@ class Sensor(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepCounted:
-    """Durable: one confirmed step; `steps` is this counter's count with it."""
+    """Durable: one confirmed step; `steps` is this counter's count with it, `boot` the boot its time belongs to."""
 
     counter: str
+    boot: int
     steps: int
     step: Step
 

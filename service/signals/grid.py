@@ -1,0 +1,54 @@
+"""The 50 Hz grid as a kernel: device samples at their places in grid units, linear interpolation between neighbours.
+
+Every grid point k in (g of the previous sample, g of this one] lies between two samples and is emitted once; a point
+within EPSILON of a sample takes its value as it is, so that a device that samples on the grid passes through
+untouched. Linear, because the wearables' own rates (12.5 to 100 Hz) leave nothing in the step band that a longer
+kernel would save, and because two samples are all the state it needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence
+
+from service.samples import Column
+
+START, FIRST, PACE, INDEX, PLACE, NEXT, X, Y, Z, SIZE = range(10)
+"""State: grid place of sample FIRST, its index, grid units a sample, index of the next sample, grid place of the
+previous sample, next grid point, values of the previous sample."""
+
+EPSILON = 1e-6
+"""Grid units (20 ns) within which a grid point is on a sample."""
+
+
+def scan(
+    x: Column,
+    y: Column,
+    z: Column,
+    n: int,
+    s: MutableSequence[float],
+    out: MutableSequence[float],
+) -> int:
+    """Place n samples; write the grid points they complete into `out` (x, y, z by turns); return how many."""
+    start, first, pace = s[0], s[1], s[2]
+    i, before, k = s[3], s[4], s[5]
+    px, py, pz = s[6], s[7], s[8]
+    m = 0
+    for j in range(n):
+        place = start + (i - first) * pace
+        cx, cy, cz = x[j], y[j], z[j]
+        while k <= place + 1e-6:
+            if place - k < 1e-6:
+                out[m], out[m + 1], out[m + 2] = cx, cy, cz
+            else:
+                part = (k - before) / (place - before)
+                out[m] = px + (cx - px) * part
+                out[m + 1] = py + (cy - py) * part
+                out[m + 2] = pz + (cz - pz) * part
+            m += 3
+            k += 1.0
+        i += 1.0
+        before = place
+        px, py, pz = cx, cy, cz
+    s[3], s[4], s[5] = i, before, k
+    s[6], s[7], s[8] = px, py, pz
+    return m // 3

@@ -1,0 +1,223 @@
+"""Device time: where each of a device's samples lies on the 50 Hz grid, and the grid samples themselves.
+
+A device numbers its samples and tells its tick (1/1024 s since boot) at every 128th of them. Between two of those the
+samples are evenly spaced. The spacing of a stretch of 128 is fixed when the stretch begins, from ticks of stretches
+before it: so an emitted grid sample never changes, and packets of any size give the same grid.
+
+The nominal rate is believed until a tick disproves it (deviates by more than its own resolution); then the rate is
+fitted over the last one to two hundred seconds of ticks and half the deviation is made good within the next stretch.
+A hole of up to FILL_S is interpolated; a longer one breaks the grid: it goes on at the first sample's own tick.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import Any
+
+import numpy as np
+
+from service.samples import GRID_HZ, TICK_EVERY, TICK_HZ, Columns, Gap, RawBlock, SampleBlock
+from service.signals import grid
+from service.signals.compiled import compiled
+
+FILL_S = 0.6
+"""Longest hole that is interpolated: less than one step at the slowest pace."""
+
+_TICK_SPAN = 1 << 16
+"""A packet carries 16 bits of the tick."""
+_TICK = GRID_HZ / TICK_HZ
+"""One tick in grid units."""
+_ANCHOR_STRETCHES = 64
+"""Stretches between two anchors of the rate fit: 164 s at 50 Hz, where a tick's resolution is worth 6 ppm."""
+_CORRECTION = 0.5
+"""Share of a deviation made good within one stretch."""
+_PACE_LIMIT = 1.25
+"""A corrected stretch is at most so much faster or slower than the fitted rate, so that time never runs back."""
+_SENSORS = ("acc_g", "gyro_rad_s", "mag_ut")
+
+
+class Timebase:
+    """Turns a device's blocks, in order and without overlap, into blocks of the grid.
+
+    `rate_hz` is the device's nominal rate. `feed` takes blocks whose index has been unwrapped (it only grows).
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self.rate_hz = rate_hz
+        self._fit = _RateFit(GRID_HZ / rate_hz)
+        self._expected: int | None = None
+        self._stretch = 0
+        self._start = 0.0
+        """Grid place of the stretch's first sample."""
+        self._pace = self._fit.pace
+        """Grid units a sample within the stretch."""
+        self._clock: tuple[int, int] | None = None
+        self._lanes: dict[str, list[float]] = {}
+
+    @property
+    def measured_rate_hz(self) -> float:
+        """The rate fitted to the device's ticks; the nominal one until ticks disprove it."""
+        return GRID_HZ / self._fit.pace
+
+    @property
+    def now_s(self) -> float:
+        """Device time of the newest sample, in seconds after boot."""
+        return self._lanes["acc_g"][grid.PLACE] / GRID_HZ if self._lanes else 0.0
+
+    def set_clock(self, index: int, tick: int) -> None:
+        """Take the device's full tick at a sample: tells the high bits of the ticks in packets."""
+        self._clock = (index, tick)
+
+    def feed(self, block: RawBlock) -> tuple[SampleBlock, Gap | None]:
+        """Place `block`; return the grid samples it completes (perhaps none) and the hole before it, if any."""
+        hole = 0 if self._expected is None else block.index - self._expected
+        broken = self._expected is None or hole / self.rate_hz > FILL_S
+        last_s = self.now_s
+        if broken:
+            self._begin(block)
+        self._fit.observe(block, self._start, self._stretch)
+        first_s = (self._start + (block.index - self._stretch * TICK_EVERY) * self._pace) / GRID_HZ
+        gap = None
+        if hole > 0:
+            gap = Gap(from_s=last_s, to_s=first_s, index=block.index - hole, samples=hole, filled=not broken)
+        self._expected = block.index + len(block)
+        return self._place(block), gap
+
+    def snapshot(self) -> dict[str, Any]:
+        """Return the whole state as plain data."""
+        plain = {key: value for key, value in vars(self).items() if key != "_fit"}
+        return copy.deepcopy({**plain, "_fit": vars(self._fit)})
+
+    @classmethod
+    def restored(cls, state: dict[str, Any]) -> Timebase:
+        """Return a timebase that goes on from `state`."""
+        made = cls(state["rate_hz"])
+        state = copy.deepcopy(state)
+        vars(made._fit).update(state.pop("_fit"))
+        vars(made).update(state)
+        return made
+
+    def _begin(self, block: RawBlock) -> None:
+        """Start the grid afresh at `block`: where its own tick says, or where the rate does if the two agree."""
+        stretch = block.index // TICK_EVERY
+        start = self._start + (stretch - self._stretch) * TICK_EVERY * self._fit.pace
+        if block.tick is not None:
+            start = self._fit.anchor(start, _full_tick(block.tick, self._expected_tick(stretch, start)))
+        self._stretch, self._start, self._pace = stretch, start, self._fit.pace
+        place = start + (block.index - stretch * TICK_EVERY) * self._pace
+        for name in _SENSORS:
+            if getattr(block, name) is not None:
+                lane = [0.0] * grid.SIZE
+                lane[grid.PLACE] = place
+                lane[grid.NEXT] = float(math.ceil(place - grid.EPSILON))
+                self._lanes[name] = lane
+
+    def _expected_tick(self, stretch: int, start: float) -> float:
+        """Return about which tick the stretch begins at: by the device's clock where it told it, else by the rate."""
+        if self._clock is None or self._expected is not None:
+            return start / _TICK
+        index, tick = self._clock
+        return tick + (stretch * TICK_EVERY - index) * self._fit.pace / _TICK
+
+    def _place(self, block: RawBlock) -> SampleBlock:
+        """Run the kernel over `block`, stretch by stretch."""
+        names = [name for name in _SENSORS if getattr(block, name) is not None and name in self._lanes]
+        begun = int(self._lanes["acc_g"][grid.NEXT])
+        made: dict[str, list[Any]] = {name: [] for name in names}
+        done, n = 0, len(block)
+        while done < n:
+            stretch, offset = divmod(block.index + done, TICK_EVERY)
+            if stretch != self._stretch:
+                self._advance(stretch)
+            end = min(n, done + TICK_EVERY - offset)
+            for name in names:
+                columns = getattr(block, name)
+                if (done, end) != (0, n):
+                    columns = tuple(column[done:end] for column in columns)
+                made[name].append(self._run(name, columns, block.index + done, end - done))
+            done = end
+        joined = {name: _joined(parts) for name, parts in made.items()}
+        return SampleBlock(start=begun, **joined)
+
+    def _advance(self, stretch: int) -> None:
+        """Go on to a later stretch: fix where it starts and how fast it runs."""
+        self._start += TICK_EVERY * self._pace + (stretch - self._stretch - 1) * TICK_EVERY * self._fit.pace
+        self._pace = self._fit.next_pace(self._start, stretch)
+        self._stretch = stretch
+
+    def _run(self, name: str, columns: Columns, index: int, n: int) -> tuple[int, Any]:
+        lane = self._lanes[name]
+        lane[grid.START], lane[grid.FIRST] = self._start, float(self._stretch * TICK_EVERY)
+        lane[grid.PACE], lane[grid.INDEX] = self._pace, float(index)
+        place = self._start + (index + n - 1 - lane[grid.FIRST]) * self._pace
+        room = 3 * max(0, int(place - lane[grid.NEXT]) + 2)
+        if isinstance(columns[0], np.ndarray):
+            state = np.array(lane)
+            out = np.empty(room)
+            m = compiled(grid.scan)(*columns, n, state, out)
+            lane[:] = state.tolist()
+            return m, out
+        plain = [0.0] * room
+        return grid.scan(*columns, n, lane, plain), plain
+
+
+class _RateFit:
+    """The rate, fitted to ticks once they disprove the nominal one, and the pace of the next stretch."""
+
+    def __init__(self, pace: float) -> None:
+        self.pace = pace
+        self._seen: tuple[int, float] | None = None
+        """Newest stretch whose tick is known, and its grid place by that tick."""
+        self._error = 0.0
+        """How far that tick lies ahead of the grid, grid units."""
+        self._anchors: list[tuple[int, float]] = []
+
+    def anchor(self, start: float, tick: int) -> float:
+        """Return where a stretch begins after a break: `start` if the tick agrees with it, else the tick's place."""
+        place = _tick_place(tick)
+        return start if abs(place - start) <= _TICK else place
+
+    def observe(self, block: RawBlock, start: float, stretch: int) -> None:
+        """Take the tick of the stretch `block` begins in, once; `start` is where the grid has that stretch."""
+        at = block.index // TICK_EVERY
+        if block.tick is None or at != stretch or (self._seen is not None and self._seen[0] >= at):
+            return
+        place = _tick_place(_full_tick(block.tick, start / _TICK))
+        self._seen, self._error = (at, place), place - start
+        if not self._anchors or at - self._anchors[-1][0] >= _ANCHOR_STRETCHES:
+            self._anchors = [*self._anchors[-1:], (at, place)]
+
+    def next_pace(self, start: float, stretch: int) -> float:
+        """Return the pace of the stretch that begins at `start`, from ticks of stretches before it."""
+        if self._seen is None or abs(self._error) <= _TICK:
+            return self.pace
+        (since, origin), (at, place) = self._anchors[0], self._seen
+        if at > since:
+            self.pace = (place - origin) / ((at - since) * TICK_EVERY)
+        ahead = place + (stretch - at) * TICK_EVERY * self.pace - start
+        wanted = self.pace + _CORRECTION * ahead / TICK_EVERY
+        return min(max(wanted, self.pace / _PACE_LIMIT), self.pace * _PACE_LIMIT)
+
+
+def _tick_place(tick: int) -> float:
+    """Return the grid place in the middle of the tick's span."""
+    return (tick + 0.5) * _TICK
+
+
+def _full_tick(low: int, expected: float) -> int:
+    """Return the tick nearest to `expected` whose low bits are `low`."""
+    around = int(expected)
+    return around + (low - around + _TICK_SPAN // 2) % _TICK_SPAN - _TICK_SPAN // 2
+
+
+def _joined(parts: list[tuple[int, Any]]) -> Columns:
+    """Return x, y, z of all parts as columns, each part interleaved and as long as its count says."""
+    if any(isinstance(out, np.ndarray) for _, out in parts):
+        flat = np.concatenate([out[: 3 * m] for m, out in parts])
+        return flat[0::3].copy(), flat[1::3].copy(), flat[2::3].copy()
+    if len(parts) == 1:
+        m, out = parts[0]
+        return out[0 : 3 * m : 3], out[1 : 3 * m : 3], out[2 : 3 * m : 3]
+    whole = [value for m, out in parts for value in out[: 3 * m]]
+    return whole[0::3], whole[1::3], whole[2::3]

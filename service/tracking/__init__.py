@@ -1,0 +1,1 @@
+"""Tracking: packets in, events out, nothing else."""

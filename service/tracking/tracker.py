@@ -1,0 +1,270 @@
+"""The Tracker: a pure fold over a device's packets, in order of (boot, index), that gives events.
+
+Codec, timebase and counters in one synchronous object without I/O or clocks: the same packets give the same steps at
+the same device times, whether they come live, from a store or on another machine. Bad packets are counted and
+skipped; samples seen before are dropped; samples that arrive late, behind newer ones, are counted as such.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from service.counters.contract import StepCounter
+from service.errors import WireError, WireFault
+from service.samples import (
+    TICK_EVERY,
+    Columns,
+    Counting,
+    Described,
+    DeviceInfo,
+    Event,
+    Packet,
+    RawBlock,
+    Rebooted,
+    Signal,
+    StepCounted,
+    Update,
+)
+from service.signals.timebase import Timebase
+from service.tracking.cadence import Cadence
+from service.wearables.contract import Wearable
+
+_INDEX_SPAN = 1 << 32
+"""Sample indices are u32 on the wire."""
+
+_BELIEVED_JUMP = 1 << 18
+"""Samples (87 min at 50 Hz) that an index may jump ahead on a single packet's word: corrupt bytes must not end a count."""
+
+CounterFactory = Callable[[], StepCounter]
+
+
+@dataclass(slots=True, kw_only=True)
+class Tally:
+    """What became of a device's packets and samples."""
+
+    packets: int = 0
+    packets_bad: int = 0
+    packets_duplicate: int = 0
+    samples: int = 0
+    samples_lost: int = 0
+    gaps: int = 0
+    reboots: int = 0
+
+
+class Tracker:
+    """Counts one device's steps.
+
+    `counters` makes each counter by name; `primary` names the one whose count is the device's `steps`.
+    """
+
+    def __init__(self, wearable: Wearable, counters: Mapping[str, CounterFactory], *, primary: str) -> None:
+        self.primary = primary
+        self.info = DeviceInfo()
+        self.tally = Tally()
+        self.steps = dict.fromkeys(counters, 0)
+        self.steps_now = 0
+        self.last_fault: WireError | None = None
+        self._wearable = wearable
+        self._factories = dict(counters)
+        self._counters = {name: make() for name, make in counters.items()}
+        self._cadence = Cadence()
+        self._timebase: Timebase | None = None
+        self._boot: int | None = None
+        self._next_index = 0
+        self._held: RawBlock | None = None
+        """A packet that claims a reboot or a long jump, until the next one bears it out."""
+        self._said: dict[str, bytes] = {}
+        """Last value of each characteristic that describes the device: the codec's state, for a snapshot."""
+
+    @property
+    def now_s(self) -> float:
+        """Device time of the newest sample, seconds after boot."""
+        return self._timebase.now_s if self._timebase else 0.0
+
+    @property
+    def cadence_spm(self) -> float | None:
+        """Steps a minute now; None while nobody walks."""
+        return self._cadence.spm(self.now_s)
+
+    @property
+    def measured_rate_hz(self) -> float | None:
+        """The device's sampling rate as its own clock tells it."""
+        return self._timebase.measured_rate_hz if self._timebase else None
+
+    def apply(self, packet: Packet) -> list[Event]:
+        """Take one packet; return what it tells. Never raises for what a device sends."""
+        try:
+            said = self._wearable.feed(packet.characteristic, packet.data)
+            if isinstance(said, RawBlock):
+                self.tally.packets += 1
+                return self._receive(said)
+        except WireError as fault:
+            self.tally.packets += 1
+            self.tally.packets_bad += 1
+            self.last_fault = fault
+            return []
+        if said is None:
+            return []
+        self._said[packet.characteristic] = packet.data
+        return self._describe(said)
+
+    def finish(self) -> list[Event]:
+        """End the stream: decide what is still pending."""
+        events = self._finish_counters()
+        return [*events, self._counting(0)]
+
+    def snapshot(self) -> dict[str, Any]:
+        """Return the whole state as plain data."""
+        return {
+            "said": {uuid: data.hex() for uuid, data in self._said.items()},
+            "tally": dataclasses.asdict(self.tally),
+            "steps": dict(self.steps),
+            "steps_now": self.steps_now,
+            "cadence": self._cadence.snapshot(),
+            "boot": self._boot,
+            "next_index": self._next_index,
+            "held": dataclasses.asdict(self._held) if self._held else None,
+            "timebase": self._timebase.snapshot() if self._timebase else None,
+            "counters": {name: counter.snapshot() for name, counter in self._counters.items()},
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take over a snapshot's state; SnapshotError where its counters are not ours."""
+        for uuid, data in state["said"].items():
+            self.apply(Packet(characteristic=uuid, data=bytes.fromhex(data), at_ns=0))
+        for name, counter in self._counters.items():
+            counter.restore(state["counters"][name])
+        self.tally = Tally(**state["tally"])
+        self.steps, self.steps_now = dict(state["steps"]), state["steps_now"]
+        self._cadence.restore(state["cadence"])
+        self._boot, self._next_index = state["boot"], state["next_index"]
+        self._held = RawBlock(**state["held"]) if state["held"] else None
+        self._timebase = Timebase.restored(state["timebase"]) if state["timebase"] else None
+
+    def _describe(self, said: DeviceInfo) -> list[Event]:
+        told = {f.name: value for f in dataclasses.fields(said) if (value := getattr(said, f.name)) is not None}
+        if self._timebase and said.clock is not None:
+            self._timebase.set_clock(*said.clock)
+        info = dataclasses.replace(self.info, **told)
+        if info == self.info:
+            return []
+        self.info = info
+        return [Described(info=info)]
+
+    def _receive(self, block: RawBlock) -> list[Event]:
+        """Count a block on; one that claims a reboot or a long jump only when the next one bears it out."""
+        held, self._held = self._held, None
+        if not self._surprising(block):
+            self.tally.packets_bad += held is not None
+            return self._count(block)
+        if held is None or held.boot != block.boot or not 0 <= block.index - held.index <= _BELIEVED_JUMP:
+            self.tally.packets_bad += held is not None
+            self._held = block
+            return []
+        return [*self._count(held), *self._count(block)]
+
+    def _surprising(self, block: RawBlock) -> bool:
+        if self._boot is None or block.boot not in {self._boot, self.info.boot}:
+            return self._boot is not None
+        return block.boot == self._boot and self._ahead(block) > _BELIEVED_JUMP
+
+    def _ahead(self, block: RawBlock) -> int:
+        """Return how many samples the block lies ahead of the next one awaited; negative for older ones."""
+        return (block.index - self._next_index + _INDEX_SPAN // 2) % _INDEX_SPAN - _INDEX_SPAN // 2
+
+    def _count(self, block: RawBlock) -> list[Event]:
+        """Place a block on the grid and run the counters over it."""
+        events = self._follow_boot(block.boot)
+        fresh = self._unseen(block)
+        if fresh is None:
+            self.tally.packets_duplicate += 1
+            return events
+        timebase = self._ready_timebase()
+        samples, gap = timebase.feed(fresh)
+        self._next_index = fresh.index + len(fresh)
+        self.tally.samples += len(fresh)
+        if gap is not None:
+            self.tally.gaps += 1
+            self.tally.samples_lost += gap.samples
+            events.append(gap)
+        pending = 0
+        for name, counter in self._counters.items():
+            update = counter.update(samples)
+            events += self._confirm(name, update)
+            if name == self.primary:
+                pending = update.pending
+                if len(update.trace) or update.bands:
+                    events.append(Signal(from_s=update.trace_from_s, values=update.trace, bands=update.bands))
+        events.append(self._counting(pending))
+        return events
+
+    def _follow_boot(self, boot: int) -> list[Event]:
+        """At a new boot number: end what was counted, begin device time anew; the counts go on."""
+        if self._boot == boot:
+            return []
+        previous, self._boot = self._boot, boot
+        if previous is None:
+            return []
+        self.tally.reboots += 1
+        events = self._finish_counters()
+        self._counters = {name: make() for name, make in self._factories.items()}
+        self._cadence = Cadence()
+        self._timebase, self._next_index = None, 0
+        if self.info.boot != boot:
+            self.info = dataclasses.replace(self.info, boot=boot, clock=None)
+        return [*events, Rebooted(boot=boot, previous=previous)]
+
+    def _unseen(self, block: RawBlock) -> RawBlock | None:
+        """Unwrap the block's index and cut off the samples seen before; None if it holds no others."""
+        index = block.index
+        if self._timebase is not None:
+            index = self._next_index + self._ahead(block)
+        seen = max(0, self._next_index - index) if self._timebase else 0
+        if seen == 0:
+            return dataclasses.replace(block, index=index)
+        if seen >= len(block):
+            return None
+        # The tick is of the stretch the block began in; what is left of it may begin in the next.
+        same_stretch = index // TICK_EVERY == (index + seen) // TICK_EVERY
+        return RawBlock(
+            boot=block.boot,
+            index=index + seen,
+            tick=block.tick if same_stretch else None,
+            acc_g=_cut(block.acc_g, seen),
+            gyro_rad_s=_cut(block.gyro_rad_s, seen) if block.gyro_rad_s else None,
+            mag_ut=_cut(block.mag_ut, seen) if block.mag_ut else None,
+        )
+
+    def _ready_timebase(self) -> Timebase:
+        if self._timebase is None:
+            if self.info.rate_hz is None:
+                raise WireError(WireFault.ORDER, "samples before the rate was read")
+            self._timebase = Timebase(self.info.rate_hz)
+            if self.info.clock is not None:
+                self._timebase.set_clock(*self.info.clock)
+        return self._timebase
+
+    def _confirm(self, name: str, update: Update) -> list[Event]:
+        events: list[Event] = []
+        for step in update.steps:
+            self.steps[name] += 1
+            events.append(StepCounted(counter=name, boot=self._boot or 0, steps=self.steps[name], step=step))
+            if name == self.primary:
+                self._cadence.add(step.at_s)
+        return events
+
+    def _finish_counters(self) -> list[Event]:
+        return [event for name, counter in self._counters.items() for event in self._confirm(name, counter.finish())]
+
+    def _counting(self, pending: int) -> Counting:
+        steps = self.steps[self.primary]
+        self.steps_now = steps + pending
+        return Counting(now_s=self.now_s, steps=steps, steps_now=self.steps_now, cadence_spm=self.cadence_spm)
+
+
+def _cut(columns: Columns, seen: int) -> Columns:
+    x, y, z = columns
+    return x[seen:], y[seen:], z[seen:]
