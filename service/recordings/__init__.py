@@ -1,0 +1,10 @@
+"""Recordings on disk: what acceleration was measured, when, and how many steps it truly holds.
+
+`read` takes any known format, `write_csv` writes the one that people and spreadsheets can read. Nothing here counts.
+"""
+
+from service.recordings.csv_file import write_csv
+from service.recordings.formats import read, suffixes
+from service.recordings.recording import Recording
+
+__all__ = ["Recording", "read", "suffixes", "write_csv"]

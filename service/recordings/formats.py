@@ -1,0 +1,74 @@
+"""Which formats there are: one line each. A file's suffix says which may apply, its first bytes which one does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Protocol
+
+from service.errors import RecordingError
+from service.recordings import csv_file, npz_file, paper_file
+from service.recordings.recording import Recording
+
+HEAD_BYTES = 4096
+"""Enough for the comment lines, the header and the first samples of a text file."""
+
+
+class Reader(Protocol):
+    """Reads one format; `rate_hz` matters where the file says no rate, `lsb_per_g` where it holds counts."""
+
+    def __call__(self, path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recording:
+        """Return the recording at `path`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """One format: the suffixes it goes by, what its first bytes look like, its reader."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    recognises: Callable[[bytes], bool]
+    read: Reader
+
+
+FORMATS: Final = (
+    Format(name="npz", suffixes=(".npz",), recognises=npz_file.recognises, read=npz_file.read_npz),
+    Format(
+        name="paper",
+        suffixes=(".csv", ".txt", ".tsv", ".dat"),
+        recognises=paper_file.recognises,
+        read=paper_file.read_paper,
+    ),
+    Format(name="csv", suffixes=(".csv", ".txt"), recognises=csv_file.recognises, read=csv_file.read_csv),
+)
+
+
+def suffixes() -> frozenset[str]:
+    """Return the file name endings `read` knows, in lower case, with the dot."""
+    return frozenset(suffix for known in FORMATS for suffix in known.suffixes)
+
+
+def read(path: str | Path, *, lsb_per_g: float = paper_file.LSB_PER_G, rate_hz: float | None = None) -> Recording:
+    """Read a recording of any known format.
+
+    `lsb_per_g` scales formats that hold a sensor's counts; `rate_hz` is the rate of a file that does not say its own.
+    RecordingError says what is wrong with the file, where in it, and what to do.
+    """
+    path = Path(path)
+    possible = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
+    if not possible:
+        known_ones = ", ".join(sorted(suffixes()))
+        raise RecordingError(str(path), f"unknown ending {path.suffix!r}; known are {known_ones}")
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+        if not head.strip():
+            raise RecordingError(str(path), "the file is empty")
+        for known in possible:
+            if known.recognises(head):
+                return known.read(path, lsb_per_g=lsb_per_g, rate_hz=rate_hz)
+    except OSError as error:
+        raise RecordingError(str(path), error.strerror or str(error)) from error
+    expected = " or ".join(known.name for known in possible)
+    raise RecordingError(str(path), f"the content is not what the ending {path.suffix!r} says ({expected})")
