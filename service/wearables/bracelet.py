@@ -174,10 +174,9 @@ class Bracelet:
         return RawBlock(boot=self._full_boot(boot_low), index=index, tick=tick, acc_g=(x, y, z))
 
     def _full_boot(self, low: int) -> int:
-        """Return the first boot number from the known one on whose low byte is `low`: boots count upwards."""
+        """Return the first boot number from the one read on whose low byte is `low`: boots count upwards."""
         known = self._boot or 0
-        self._boot = (known + (low - known) % 256) & 0xFFFFFFFF
-        return self._boot
+        return (known + (low - known) % 256) & 0xFFFFFFFF
 
     def _boot_number(self, data: bytes) -> DeviceInfo:
         (self._boot,) = _fixed("<I", data, BOOT)

@@ -1,0 +1,1 @@
+"""Links: how a device's bytes arrive. One object is one connection, never used again."""
