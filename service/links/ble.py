@@ -35,7 +35,7 @@ REQUEST_TIMEOUT_S = 5.0
 SILENCE_S = 5.0
 """A link that is up but brings nothing for so long is dropped: no wearable we know pauses longer."""
 QUEUE_PACKETS = 4096
-"""Packets waiting for the session: 13 minutes at five a second. Policy: the newest is dropped, which shows as a gap."""
+"""Packets that may wait: 13 min at five a second. Policy: the newest is dropped, which shows as a gap."""
 
 _ADVICE = {
     LinkFault.NO_ADAPTER: ". No usable Bluetooth: is an adapter plugged in and switched on, and on Linux does bluetoothd"
@@ -255,4 +255,6 @@ def _translated(what: str, otherwise: LinkFault = LinkFault.REFUSED) -> Iterator
     except TimeoutError as error:
         raise LinkError(LinkFault.TIMEOUT, f"{what}: no answer in time") from error
     except (BleakError, OSError, EOFError) as error:
-        raise LinkError(otherwise, f"{what}: {error or type(error).__name__}{_ADVICE.get(otherwise, '')}") from error
+        raise LinkError(
+            otherwise, f"{what}: {str(error) or type(error).__name__}{_ADVICE.get(otherwise, '')}"
+        ) from error

@@ -36,7 +36,7 @@ _INDEX_SPAN = 1 << 32
 """Sample indices are u32 on the wire."""
 
 _BELIEVED_JUMP = 1 << 18
-"""Samples (87 min at 50 Hz) that an index may jump ahead on a single packet's word: corrupt bytes must not end a count."""
+"""Samples (87 min at 50 Hz) an index may jump ahead on one packet's word: corrupt bytes must not end a count."""
 
 CounterFactory = Callable[[], StepCounter]
 

@@ -1,0 +1,38 @@
+"""Every option of the service, in one place: the command line and its help are made from these fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from service.errors import ParameterError
+
+
+def option(default: Any, text: str, *, unit: str = "", low: float | None = None, high: float | None = None) -> Any:  # noqa: ANN401
+    """Declare an option: its default, what it does, its unit and range (inclusive)."""
+    return field(default=default, metadata={"text": text, "unit": unit, "low": low, "high": high})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """The service's options; ParameterError where one is out of range."""
+
+    host: str = option("127.0.0.1", "address to listen on; only this machine's own addresses are allowed for now")
+    port: int = option(8600, "TCP port to listen on; 0 picks a free one", unit="port", low=0, high=65535)
+    counter: str = option("double_threshold", "counter whose count is a device's steps")
+    preset: str = option("tuned", "its parameters: paper (as published) or tuned")
+    durable_limit: int = option(
+        1000, "events that may wait for a slow reader before it is closed", unit="events", low=10, high=100_000
+    )
+
+    def __post_init__(self) -> None:
+        """Check ranges, and that nobody else can reach an interface without access control."""
+        for name, spec in self.__dataclass_fields__.items():
+            low, high, value = spec.metadata["low"], spec.metadata["high"], getattr(self, name)
+            if low is not None and not low <= value <= high:
+                raise ParameterError(name, value, f"from {low} to {high} {spec.metadata['unit']}")
+        if self.host not in LOOPBACK:
+            raise ParameterError("host", self.host, f"one of {', '.join(LOOPBACK)}: the API has no access control yet")
+
+
+LOOPBACK = ("127.0.0.1", "::1", "localhost")

@@ -1,0 +1,105 @@
+"""A device as the service knows it: its connection's state, its session, and the task that holds its link."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+
+from service.errors import LinkError
+from service.links.ble import Sighting
+from service.links.contract import Link
+from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State, advance, backoff_s
+from service.pipeline.notices import DeviceChanged
+from service.pipeline.session import Publish, Session
+from service.tracking.tracker import Tracker
+from service.wearables.contract import Wearable
+
+logger = logging.getLogger(__name__)
+
+
+class Device:
+    """One device, from the first time it is heard."""
+
+    def __init__(self, sighting: Sighting, wearable: Wearable, tracker: Tracker, publish: Publish) -> None:
+        self.address = sighting.address
+        self.name = sighting.name
+        self.rssi_dbm: int | None = sighting.rssi_dbm
+        self.wearable = wearable
+        self.session = Session(lambda: self.id, tracker, publish)
+        self.state = State.SEEN
+        self.reason: str | None = None
+        self.since_ns = time.time_ns()
+        self.wanted = False
+        self.not_before_s = 0.0
+        """Monotonic time before which no attempt is made."""
+        self.task: asyncio.Task[None] | None = None
+        self._failures = 0
+        self._told_s = 0.0
+
+    @property
+    def id(self) -> str:
+        """The id the device gave itself; its address until it has."""
+        return self.session.tracker.info.device or self.address
+
+    @property
+    def is_due(self) -> bool:
+        """Whether an advertisement should start an attempt now."""
+        return self.wanted and self.state in WAITING and time.monotonic() >= self.not_before_s
+
+    def heard(self, sighting: Sighting, *, tell_every_s: float) -> None:
+        """Take an advertisement."""
+        self.name, self.rssi_dbm = sighting.name or self.name, sighting.rssi_dbm
+        if time.monotonic() - self._told_s >= tell_every_s:
+            self._told_s = time.monotonic()
+            self.session.tell(DeviceChanged(), time.time_ns())
+
+    def move(self, cause: Cause, reason: str | None = None) -> None:
+        """Move the connection's state on, and tell."""
+        self.state = advance(self.state, cause)
+        self.reason, self.since_ns = reason, time.time_ns()
+        self.session.state_changed(self.state, reason)
+
+    def want(self) -> None:
+        """Have it connected as soon as it is heard."""
+        self.wanted = True
+        self.not_before_s, self._failures = 0.0, 0
+        if self.state is State.DISCONNECTED:
+            self.move(Cause.WANTED)
+
+    def unwant(self) -> None:
+        """Close its link and leave it alone."""
+        self.wanted = False
+        self.move(Cause.UNWANTED)
+        self.stop()
+
+    def stop(self) -> None:
+        """Close its link."""
+        if self.task is not None:
+            self.task.cancel()
+
+    async def run(self, link: Link, settled: asyncio.Event, jitter: Callable[[], float]) -> None:
+        """Hold the link until it is lost or no longer wanted; `settled` is set once it is connected or has failed."""
+        connected_s: float | None = None
+        try:
+            async with link:
+                connected_s = time.monotonic()
+                self.move(Cause.CONNECTED)
+                settled.set()
+                await self.session.follow(link)
+        except LinkError as error:
+            self._lost(error.why, connected_s, jitter())
+        except Exception as error:
+            logger.exception("link of %s", self.address)
+            self._lost(f"an internal error: {error!r}", connected_s, jitter())
+
+    def _lost(self, why: str, connected_s: float | None, jitter: float) -> None:
+        """Note that the link failed or was lost, and when to try again."""
+        if self.state not in LINKED:
+            return
+        if connected_s is not None and time.monotonic() - connected_s >= HEALTHY_S:
+            self._failures = 0
+        self._failures += 1
+        self.not_before_s = time.monotonic() + backoff_s(self._failures, jitter)
+        self.move(Cause.FAILED if connected_s is None else Cause.DROPPED, why)

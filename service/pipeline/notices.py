@@ -1,0 +1,37 @@
+"""What goes through the hub: a Tracker's events with the device's id, host time and, if durable, an ordinal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from service.pipeline.lifecycle import State
+from service.samples import Counting, Described, Event, Signal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateChanged:
+    """Durable: a device's connection came into another state; `reason` is a sentence where it was not wanted."""
+
+    state: State
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceChanged:
+    """Ephemeral: something a device's description says has changed, or a device was seen for the first time."""
+
+
+Told = Event | StateChanged | DeviceChanged
+
+EPHEMERAL = (Signal, Counting, Described, DeviceChanged)
+"""Events of which only the newest matters: no ordinal, conflated for slow readers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Notice:
+    """One event of one device. `at_ns` is host UTC of the moment it tells of; ephemeral ones have no ordinal."""
+
+    device: str
+    at_ns: int
+    ordinal: int | None
+    event: Told

@@ -1,0 +1,87 @@
+"""A session: one device's Tracker, what it told, and the notices made of it; it outlives every single link.
+
+Steps and events are kept in memory, the newest LOG_NOTICES of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+
+from service.links.contract import Link
+from service.pipeline.lifecycle import State
+from service.pipeline.notices import EPHEMERAL, DeviceChanged, Notice, StateChanged, Told
+from service.samples import Described, Event, Gap, Packet, Rebooted, StepCounted
+from service.signals.hosttime import HostClock
+from service.tracking.tracker import Tracker
+
+LOG_NOTICES = 100_000
+"""Durable notices kept: a day of walking, 30 MB. Policy: the oldest go."""
+YIELD_EVERY = 64
+"""Packets handled in a row before others may run: 64 × 100 µs."""
+
+Publish = Callable[[Notice], None]
+
+
+class Session:
+    """One device's counting, over any number of links. `name_device` gives its id, `publish` takes each notice."""
+
+    def __init__(self, name_device: Callable[[], str], tracker: Tracker, publish: Publish) -> None:
+        self._name_device = name_device
+        self.tracker = tracker
+        self.since_ns = time.time_ns()
+        self.log: deque[Notice] = deque(maxlen=LOG_NOTICES)
+        self._publish = publish
+        self._clock = HostClock()
+        self._ordinal = 0
+
+    async def follow(self, link: Link) -> None:
+        """Take the link's packets until it is lost (LinkError) or the task is cancelled."""
+        handled = 0
+        async for packet in link:
+            self.apply(packet)
+            handled += 1
+            if handled % YIELD_EVERY == 0:
+                await asyncio.sleep(0)
+
+    def apply(self, packet: Packet) -> None:
+        """Take one packet, from any link."""
+        events = self.tracker.apply(packet)
+        self._clock.arrived(self.tracker.now_s, packet.at_ns)
+        for event in events:
+            if isinstance(event, Rebooted):
+                self._clock = HostClock()
+                self._clock.arrived(self.tracker.now_s, packet.at_ns)
+            self.tell(event, self._host_ns(event))
+
+    def state_changed(self, state: State, reason: str | None) -> None:
+        """Tell that the device's connection came into another state."""
+        self.tell(StateChanged(state=state, reason=reason), time.time_ns())
+
+    def tell(self, event: Told, at_ns: int) -> None:
+        """Publish an event, and keep it if it is durable."""
+        if isinstance(event, Described):
+            event = DeviceChanged()
+        ordinal = None
+        if not isinstance(event, EPHEMERAL):
+            self._ordinal += 1
+            ordinal = self._ordinal
+        notice = Notice(device=self._name_device(), at_ns=at_ns, ordinal=ordinal, event=event)
+        if ordinal is not None:
+            self.log.append(notice)
+        self._publish(notice)
+
+    def steps(self) -> list[Notice]:
+        """Return the steps kept, in the order they were confirmed."""
+        return [notice for notice in self.log if isinstance(notice.event, StepCounted)]
+
+    def _host_ns(self, event: Event) -> int:
+        match event:
+            case StepCounted():
+                return self._clock.at_ns(event.step.at_s)
+            case Gap():
+                return self._clock.at_ns(event.to_s)
+            case _:
+                return self._clock.at_ns(self.tracker.now_s)
