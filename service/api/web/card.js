@@ -1,0 +1,168 @@
+/**
+ * One device's card: its elements, filled from a Device, and its plot.
+ *
+ * A card writes only what changed, so that selection, focus and a screen reader's place stay where they are.
+ */
+
+import { UNKNOWN, duration, localTime, measured, percent, plural, whole } from "./format.js";
+import { Plot } from "./plot.js";
+
+/** State in words; the icon has the same name. */
+const STATES = {
+  seen: "In range, not connected",
+  connecting: "Connecting…",
+  streaming: "Live",
+  lost: "Lost",
+  disconnected: "Disconnected",
+};
+/** States in which the server holds the device or tries to; the button then offers to let it go. */
+const HELD = new Set(["connecting", "streaming", "lost"]);
+const LOW_BATTERY_PERCENT = 20;
+const LEVEL_WIDTH = 17;
+
+export class Card {
+  element;
+  #fields = {};
+  #plot;
+  #act;
+  #asked = null;
+  #state = null;
+  #steps = null;
+
+  /** `act(device, verb)` asks the server to "connect" or "disconnect" and resolves to an error's text or null. */
+  constructor(template, trace, act) {
+    this.element = template.content.firstElementChild.cloneNode(true);
+    for (const node of this.element.querySelectorAll("[data-f]")) this.#fields[node.dataset.f] = node;
+    this.#plot = new Plot(this.#fields.canvas, trace);
+    this.#act = act;
+  }
+
+  /** Fill the card from `device`; `now` is the server's clock. */
+  show(device, now) {
+    this.#head(device, now);
+    this.#numbers(device);
+    this.#facts(device, now);
+  }
+
+  draw(nowMs, options) {
+    this.#plot.draw(nowMs, options);
+  }
+
+  restyle() {
+    this.#plot.restyle();
+  }
+
+  #head(device, now) {
+    const { state, manufacturer, model, firmware, id } = device;
+    const name = device.name || model || id;
+    this.#text("name", name);
+    const made = [manufacturer, model, firmware && `firmware ${firmware}`].filter(Boolean).join(" ");
+    this.#text("model", made ? `${made} · ${id}` : id);
+    this.element.dataset.state = state;
+    this.#fields.icon.setAttribute("href", `#i-${state in STATES ? state : "seen"}`);
+    this.#text("state", STATES[state] ?? state);
+    this.#text("notice", notice(device, now));
+    this.#fields.notice.hidden = !this.#fields.notice.textContent;
+    this.#fields.canvas.setAttribute("aria-label", `The last ten seconds of ${name}: filtered acceleration in g, `
+      + "both thresholds, and a mark at each counted step.");
+    this.#battery(device.battery_percent);
+    this.#button(device, name);
+  }
+
+  #battery(level) {
+    this.#fields["battery-row"].hidden = level == null;
+    this.#text("battery", measured(level, 0, "%"));
+    this.#fields["battery-level"].setAttribute("width", String((LEVEL_WIDTH * (level ?? 0)) / 100));
+    this.#fields["battery-row"].classList.toggle("low", (level ?? 100) < LOW_BATTERY_PERCENT);
+  }
+
+  #button(device, name) {
+    if (device.state !== this.#state) this.#asked = null;
+    this.#state = device.state;
+    const verb = HELD.has(device.state) ? "disconnect" : "connect";
+    const { button } = this.#fields;
+    this.#text("button", verb === "connect" ? "Connect" : "Disconnect");
+    button.setAttribute("aria-label", `${button.textContent} ${name}`);
+    button.classList.toggle("primary", verb === "connect");
+    button.setAttribute("aria-disabled", String(this.#asked !== null));
+    button.onclick = () => this.#ask(device, verb);
+  }
+
+  async #ask(device, verb) {
+    if (this.#asked) return;
+    this.#asked = verb;
+    this.#fields.button.setAttribute("aria-disabled", "true");
+    const error = await this.#act(device, verb);
+    this.#asked = null;
+    this.#fields.button.setAttribute("aria-disabled", "false");
+    if (error === null) return;
+    this.#text("notice", error);
+    this.#fields.notice.hidden = false;
+  }
+
+  #numbers({ state, steps, steps_now, cadence_spm }) {
+    const pending = Math.max(0, steps_now - steps);
+    this.#text("steps-now", whole(steps_now));
+    this.#text("steps", whole(steps));
+    this.#text("pending", `+${whole(pending)}`);
+    this.#fields["pending-chip"].classList.toggle("none", pending === 0);
+    this.element.classList.toggle("provisional", pending > 0);
+    this.#text("cadence", state === "streaming" ? whole(cadence_spm) : UNKNOWN);
+    if (this.#steps !== null && steps_now > this.#steps) this.#beat();
+    this.#steps = steps_now;
+  }
+
+  #beat() {
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (!still) this.#fields["steps-now"].animate({ scale: [1.045, 1] }, { duration: 260, easing: "ease-out" });
+  }
+
+  #facts(device, now) {
+    this.#text("packets", whole(device.packets));
+    this.#text("packets-more", `${whole(device.packets_bad)} bad, ${whole(device.packets_duplicate)} repeated`);
+    this.#text("lost", percent(device.samples_lost, device.samples));
+    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`);
+    this.#text("gaps", whole(device.gaps));
+    this.#text("gaps-more", plural(device.reboots, "restart"));
+    this.#text("rate", measured(device.rate_hz, 1, "Hz"));
+    this.#text("rssi", measured(device.rssi_dbm, 0, "dBm"));
+    this.#text("rssi-more", strength(device.rssi_dbm));
+    const since = device.session_since;
+    this.#text("session", since ? localTime(since, now) : UNKNOWN);
+    this.#text("session-more", since ? `for ${duration((now - new Date(since)) / 1000)}` : "not begun");
+    this.#counters(device);
+  }
+
+  #counters({ primary, counters }) {
+    const others = Object.entries(counters).filter(([name]) => name !== primary);
+    this.#text("primary", words(primary));
+    this.#text("others", others.map(([name, steps]) => `${words(name)} ${whole(steps)}`).join(" · "));
+  }
+
+  #text(field, text) {
+    const node = this.#fields[field];
+    if (node.textContent !== text) node.textContent = text;
+  }
+}
+
+/** Return the sentence under a card's head, or nothing where all is well. */
+export function notice({ state, reason, since }, now) {
+  const why = reason ? ` (${reason})` : "";
+  const at = localTime(since, now);
+  if (state === "lost") {
+    return `No contact since ${at}, for ${duration((now - new Date(since)) / 1000)}${why}. `
+      + "It comes back by itself once it is in range.";
+  }
+  if (state === "disconnected") return `Disconnected since ${at}${why}.`;
+  return reason ? `${STATES[state] ?? state}: ${reason}` : "";
+}
+
+function strength(dbm) {
+  if (dbm == null) return "";
+  if (dbm > -65) return "strong";
+  return dbm > -80 ? "good" : "weak";
+}
+
+function words(name) {
+  return name.replaceAll("_", " ");
+}

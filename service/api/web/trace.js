@@ -1,0 +1,125 @@
+/**
+ * The last seconds of one device's filtered signal, with what was decided on it.
+ *
+ * Everything lies on device time. `edge(nowMs)` says which device time belongs at the plot's right edge: the newest
+ * sample's time carried on by the viewer's clock, LATE_S behind it, so that uneven arrival does not shake the picture.
+ */
+
+/** Samples kept: 40 s at 50 Hz, far more than any plot shows. */
+const CAPACITY = 2048;
+const KEPT_S = 35;
+/** How far the right edge stays behind the newest sample: longer than the usual pause between two messages. */
+const LATE_S = 0.4;
+/** How fast the estimate of the device's clock follows a slower one; crystals differ by far less. */
+const LEAK = 0.01;
+/** A jump of the device's time beyond this is shown at once and not glided to. */
+const JUMP_S = 1;
+const GLIDE_PER_S = 4;
+
+export class Trace {
+  rateHz = 50;
+  bands = [];
+  steps = [];
+  gaps = [];
+  #values = new Float32Array(CAPACITY).fill(NaN);
+  #begin = null;
+  #end = null;
+  #offsetS = null;
+  #arrivedS = 0;
+  #shownS = null;
+  #drawnS = 0;
+
+  /** Forget everything: the device's time began anew. */
+  reset() {
+    this.bands = [];
+    this.steps = [];
+    this.gaps = [];
+    this.#values.fill(NaN);
+    this.#begin = null;
+    this.#end = null;
+    this.#offsetS = null;
+    this.#shownS = null;
+  }
+
+  /** Take a "signal" message that arrived at `nowMs` of the viewer's monotonic clock. */
+  addSignal({ from_s, rate_hz, values, bands = [] }, nowMs) {
+    const start = Math.round(from_s * rate_hz);
+    const backwards = this.#end !== null && start < this.#end - CAPACITY / 4;
+    if (backwards || rate_hz !== this.rateHz) this.reset();
+    this.rateHz = rate_hz;
+    this.#write(start, values);
+    for (const band of bands) this.#addBand(band);
+    if (values.length) this.#follow(this.#end / rate_hz, nowMs / 1000);
+    this.#prune();
+  }
+
+  /** Take a counted "step"; a repeated one changes nothing. */
+  addStep({ ordinal, device_s, peak }, nowMs) {
+    if (this.steps.some((step) => step.ordinal === ordinal)) return;
+    this.steps.push({ ordinal, atS: device_s, peak: peak ?? this.valueAt(device_s), bornMs: nowMs });
+  }
+
+  /** Take a "gap": `filled` ones were interpolated and are drawn as signal. */
+  addGap({ from_s, to_s, filled }) {
+    if (!filled) this.gaps.push({ fromS: from_s, toS: to_s });
+  }
+
+  /** Return the device time at the right edge, or null before the first sample. */
+  edge(nowMs) {
+    if (this.#offsetS === null) return null;
+    const nowS = nowMs / 1000;
+    const away = this.#offsetS - (this.#shownS ?? this.#offsetS);
+    const glide = Math.abs(away) > JUMP_S ? 1 : 1 - Math.exp(-Math.max(0, nowS - this.#drawnS) * GLIDE_PER_S);
+    this.#shownS = (this.#shownS ?? this.#offsetS) + away * glide;
+    this.#drawnS = nowS;
+    return nowS + this.#shownS - LATE_S;
+  }
+
+  /** Return the device time of the first sample ever, or null: before it nothing is missing. */
+  get beginS() {
+    return this.#begin === null ? null : this.#begin / this.rateHz;
+  }
+
+  /** Return the signal at grid index `k` in g; NaN where there is none. */
+  at(k) {
+    return this.#end === null || k >= this.#end || k < this.#end - CAPACITY ? NaN : this.#values[k & (CAPACITY - 1)];
+  }
+
+  /** Return the signal at device time `s` in g; null where there is none. */
+  valueAt(s) {
+    const value = this.at(Math.round(s * this.rateHz));
+    return Number.isNaN(value) ? null : value;
+  }
+
+  #write(start, values) {
+    const end = start + values.length;
+    const from = Math.max(this.#end ?? start, end - CAPACITY);
+    for (let k = from; k < start; k += 1) this.#values[k & (CAPACITY - 1)] = NaN;
+    values.forEach((value, i) => {
+      this.#values[(start + i) & (CAPACITY - 1)] = value ?? NaN;
+    });
+    this.#begin ??= start;
+    this.#end = Math.max(this.#end ?? end, end);
+  }
+
+  #addBand(band) {
+    const known = this.bands.findIndex(({ from_s }) => from_s === band.from_s);
+    if (known >= 0) this.bands[known] = band;
+    else this.bands.push(band);
+  }
+
+  /** Hold on to the least delayed arrival: the largest difference of device and viewer clock, leaking slowly. */
+  #follow(endS, nowS) {
+    const sample = endS - nowS;
+    const held = this.#offsetS === null ? sample : this.#offsetS - LEAK * (nowS - this.#arrivedS);
+    this.#offsetS = Math.max(sample, held);
+    this.#arrivedS = nowS;
+  }
+
+  #prune() {
+    const oldestS = this.#end / this.rateHz - KEPT_S;
+    this.bands = this.bands.filter(({ to_s }) => to_s > oldestS);
+    this.steps = this.steps.filter(({ atS }) => atS > oldestS);
+    this.gaps = this.gaps.filter(({ toS }) => toS > oldestS);
+  }
+}
