@@ -38,8 +38,8 @@ QUEUE_PACKETS = 4096
 """Packets that may wait: 13 min at five a second. Policy: the newest is dropped, which shows as a gap."""
 
 _ADVICE = {
-    LinkFault.NO_ADAPTER: ". No usable Bluetooth: is an adapter plugged in and switched on, and on Linux does bluetoothd"
-    " run? `steplink demo` needs none."
+    LinkFault.NO_ADAPTER: ". No usable Bluetooth: is an adapter plugged in and switched on, and does bluetoothd run"
+    " (Linux)? `steplink demo` needs none."
 }
 
 

@@ -1,0 +1,1 @@
+"""The HTTP face: REST, the live feed, the page."""

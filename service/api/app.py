@@ -1,0 +1,82 @@
+"""The FastAPI application: routes, and the page's files."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Query, Request, WebSocket
+from fastapi.middleware import Middleware
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.staticfiles import StaticFiles
+from pydantic import TypeAdapter
+
+from service.api import models
+from service.api.devices import add_device_routes
+from service.api.guard import Guard
+from service.api.live import serve_feed
+from service.config import LOOPBACK
+from service.errors import ParameterError, UnknownDeviceError
+from service.pipeline.supervisor import Supervisor
+
+WEB = Path(__file__).parent / "web"
+DESCRIPTION = """Live step counts of Bluetooth LE wearables.
+
+Lists are `{items, next}`: pass `next` as `after` for what follows. Times are UTC with an explicit offset; `*_s` are
+device time, seconds after the device's boot. The live feed is the WebSocket `/api/v1/live` (repeat `?device=` to choose
+devices): a `snapshot` first, then events; `GET /api/v1/live/schema` has the JSON Schema of every message."""
+
+
+def create_app(supervisor: Supervisor) -> FastAPI:
+    """Return the application over `supervisor`, which runs while the application does."""
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        async with supervisor.running():
+            yield
+
+    app = FastAPI(
+        title="steplink",
+        version=version("steplink"),
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        redoc_url=None,
+        docs_url=None,
+        middleware=[Middleware(Guard, hosts=frozenset(LOOPBACK))],
+    )
+    app.add_exception_handler(UnknownDeviceError, _not_found)
+    app.add_exception_handler(ParameterError, _unprocessable)
+    add_device_routes(app, supervisor)
+    _add_live(app, supervisor)
+    _add_page(app)
+    return app
+
+
+async def _not_found(_request: Request, error: Exception) -> JSONResponse:
+    return JSONResponse({"detail": str(error)}, status_code=404)
+
+
+async def _unprocessable(_request: Request, error: Exception) -> JSONResponse:
+    return JSONResponse({"detail": str(error)}, status_code=422)
+
+
+def _add_live(app: FastAPI, supervisor: Supervisor) -> None:
+    @app.get("/api/v1/live/schema", tags=["live"])
+    async def live_schema() -> dict[str, Any]:
+        """Return the JSON Schema of every message of the live feed."""
+        return TypeAdapter(models.LiveMessage).json_schema(mode="serialization")
+
+    @app.websocket("/api/v1/live")
+    async def live(socket: WebSocket, device: Annotated[list[str] | None, Query()] = None) -> None:
+        await serve_feed(socket, supervisor, device or [])
+
+
+def _add_page(app: FastAPI) -> None:
+    @app.get("/", include_in_schema=False)
+    async def page() -> FileResponse:
+        return FileResponse(WEB / "index.html")
+
+    app.mount("/web", StaticFiles(directory=WEB), name="web")

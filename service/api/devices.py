@@ -1,0 +1,54 @@
+"""Routes of the service's health and of its devices."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Query
+
+from service.api import models
+from service.api.steps import StepsQuery, list_page
+from service.api.views import device_view
+from service.pipeline.supervisor import Supervisor
+
+_UNKNOWN: dict[int | str, dict[str, Any]] = {404: {"model": models.Problem, "description": "No device of that id"}}
+
+
+def add_device_routes(app: FastAPI, supervisor: Supervisor) -> None:
+    """Add the routes over `supervisor` to `app`."""
+
+    @app.get("/healthz", tags=["service"])
+    async def health() -> models.Health:
+        """Tell that the service runs, and whether Bluetooth does."""
+        trouble = supervisor.trouble
+        return models.Health(
+            version=app.version,
+            devices=len(supervisor.devices),
+            bluetooth="ok" if trouble is None else "unavailable",
+            reason=None if trouble is None else trouble.why,
+        )
+
+    @app.get("/api/v1/devices", tags=["devices"])
+    async def list_devices() -> models.Page[models.Device]:
+        """List every device heard since the start."""
+        return models.Page(items=[device_view(device) for device in supervisor.devices])
+
+    @app.get("/api/v1/devices/{id}", tags=["devices"], responses=_UNKNOWN)
+    async def get_device(id: str) -> models.Device:  # noqa: A002  # the path's own word
+        """Tell how a device stands now; its link address finds it too."""
+        return device_view(supervisor.device(id))
+
+    @app.post("/api/v1/devices/{id}/connect", tags=["devices"], status_code=202, responses=_UNKNOWN)
+    async def connect(id: str) -> models.Device:  # noqa: A002
+        """Keep a device connected: now if it is near, and again whenever it was lost."""
+        return device_view(supervisor.connect(id))
+
+    @app.post("/api/v1/devices/{id}/disconnect", tags=["devices"], status_code=202, responses=_UNKNOWN)
+    async def disconnect(id: str) -> models.Device:  # noqa: A002
+        """Close a device's connection and leave it alone; its count stays."""
+        return device_view(supervisor.disconnect(id))
+
+    @app.get("/api/v1/devices/{id}/steps", tags=["devices"], responses=_UNKNOWN)
+    async def list_steps(id: str, query: Annotated[StepsQuery, Query()]) -> models.Page[models.StepEvent]:  # noqa: A002
+        """List a device's confirmed steps, oldest first."""
+        return list_page(supervisor.device(id), query)

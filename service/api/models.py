@@ -1,0 +1,184 @@
+"""What the API says, as schemas: devices, steps, and every event of the live feed.
+
+Times named `at` or `since` are UTC with an explicit offset; times named `*_s` are device time, seconds after the
+device's boot. Accelerations are in g. `ordinal` counts a device's durable events from 1; ephemeral ones have none.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Generic, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.pipeline.lifecycle import State
+
+Item = TypeVar("Item")
+
+_DEVICE = "sim-7f3a21"
+_AT = "2026-01-02T03:04:05.678000Z"
+
+
+class Page(BaseModel, Generic[Item]):
+    """A list, and the cursor of what follows it: null at the end."""
+
+    items: list[Item]
+    next: str | None = Field(default=None, description="Pass as `after` for the next page; null at the end")
+
+
+class Device(BaseModel):
+    """A device as it stands now."""
+
+    id: str = Field(description="The id the device gave itself; its link address until it has", examples=[_DEVICE])
+    name: str | None = Field(examples=["Bracelet"])
+    address: str = Field(description="Link address", examples=["F0:51:E9:7F:3A:21"])
+    state: State
+    reason: str | None = Field(description="Why it is lost, as a sentence")
+    since: datetime = Field(description="When it came into this state", examples=[_AT])
+    session_since: datetime = Field(description="Since when `steps` counts", examples=[_AT])
+    primary: str = Field(description="Counter whose count `steps` is", examples=["double_threshold"])
+    steps: int = Field(description="Confirmed steps since the session began; never falls", examples=[128])
+    steps_now: int = Field(description="`steps` plus those that are likely; may fall", examples=[130])
+    counters: dict[str, int] = Field(description="Confirmed steps by counter", examples=[{"double_threshold": 128}])
+    cadence_spm: float | None = Field(description="Steps a minute; null while nobody walks", examples=[108.4])
+    battery_percent: int | None = Field(examples=[87])
+    rate_hz: float | None = Field(description="Nominal sampling rate", examples=[50.0])
+    measured_rate_hz: float | None = Field(description="Sampling rate by the device's own clock", examples=[50.0])
+    rssi_dbm: int | None = Field(examples=[-58])
+    packets: int
+    packets_bad: int = Field(description="Packets that broke the format; skipped")
+    packets_duplicate: int = Field(description="Packets that held nothing new; skipped")
+    samples: int
+    samples_lost: int = Field(description="Samples that did not arrive")
+    gaps: int
+    reboots: int
+    manufacturer: str | None
+    model: str | None
+    firmware: str | None
+
+
+class _Event(BaseModel):
+    model_config = ConfigDict(ser_json_inf_nan="null")
+
+    device: str = Field(examples=[_DEVICE])
+    at: datetime = Field(description="UTC of the moment it tells of", examples=[_AT])
+
+
+class _Durable(_Event):
+    ordinal: int = Field(description="Number among the device's durable events, from 1", examples=[42])
+
+
+class StepEvent(_Durable):
+    """One confirmed step. `strength`, `peak`, `valley` and both thresholds are in g on the filtered signal."""
+
+    type: Literal["step"] = "step"
+    device_s: float = Field(description="Device time of the step", examples=[21.34])
+    boot: int
+    counter: str = Field(examples=["double_threshold"])
+    steps: int = Field(description="This counter's count with this step", examples=[37])
+    strength: float = Field(examples=[0.61])
+    interval_s: float | None = Field(description="Time since the step before; null for the first", examples=[0.54])
+    peak: float | None = Field(examples=[1.32])
+    valley: float | None = Field(examples=[0.71])
+    upper: float | None = Field(examples=[1.02])
+    lower: float | None = Field(examples=[0.74])
+
+
+class StateEvent(_Durable):
+    """The connection came into another state."""
+
+    type: Literal["state"] = "state"
+    state: State
+    reason: str | None
+
+
+class GapEvent(_Durable):
+    """Samples did not arrive. Filled gaps (up to 0.6 s) were interpolated; no step lies inside others."""
+
+    type: Literal["gap"] = "gap"
+    from_s: float
+    to_s: float
+    samples: int
+    filled: bool
+
+
+class RebootEvent(_Durable):
+    """The device started again: device time begins at zero, the count goes on."""
+
+    type: Literal["reboot"] = "reboot"
+    boot: int
+    previous: int
+
+
+class BandModel(BaseModel):
+    """Both thresholds over a window of device time."""
+
+    from_s: float
+    to_s: float
+    upper: float
+    lower: float
+
+
+class SignalEvent(_Event):
+    """The primary counter's filtered signal, for plots; some may be left out for a slow reader."""
+
+    type: Literal["signal"] = "signal"
+    from_s: float = Field(description="Device time of the first value", examples=[21.2])
+    rate_hz: int = 50
+    values: list[float] = Field(description="g", examples=[[1.01, 1.04, 1.11]])
+    bands: list[BandModel]
+
+
+class CountingEvent(_Event):
+    """Both counts and the cadence, at each packet."""
+
+    type: Literal["counting"] = "counting"
+    now_s: float = Field(description="Device time of the newest sample")
+    steps: int
+    steps_now: int
+    cadence_spm: float | None
+
+
+class DeviceEvent(_Event):
+    """A device was heard for the first time, or its description changed."""
+
+    type: Literal["device"] = "device"
+    value: Device
+
+
+class Snapshot(BaseModel):
+    """The first message of a live feed: every device as it stands now."""
+
+    type: Literal["snapshot"] = "snapshot"
+    at: datetime
+    devices: list[Device]
+
+
+class Lagging(BaseModel):
+    """The last message to a reader that was too slow; the feed closes with code 4408."""
+
+    type: Literal["lagging"] = "lagging"
+    detail: str
+
+
+LiveMessage = Annotated[
+    StepEvent | StateEvent | GapEvent | RebootEvent | SignalEvent | CountingEvent | DeviceEvent | Snapshot | Lagging,
+    Field(discriminator="type"),
+]
+DurableEvent = Annotated[StepEvent | StateEvent | GapEvent | RebootEvent, Field(discriminator="type")]
+
+
+class Health(BaseModel):
+    """That the service runs, and whether it can hear devices."""
+
+    status: Literal["ok"] = "ok"
+    version: str = Field(examples=["0.1.0"])
+    devices: int
+    bluetooth: Literal["ok", "unavailable"]
+    reason: str | None = Field(description="Why nothing can be heard, and what to do")
+
+
+class Problem(BaseModel):
+    """What went wrong, as a sentence."""
+
+    detail: str

@@ -1,0 +1,131 @@
+"""From the pipeline's objects to the API's schemas."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+from service.api import models
+from service.pipeline.device import Device
+from service.pipeline.notices import DeviceChanged, Notice, StateChanged
+from service.pipeline.supervisor import Supervisor
+from service.samples import Band, Counting, Gap, Rebooted, Signal, StepCounted
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_SIGNAL_DIGITS = 4
+"""Digits of a plotted g: finer than any screen."""
+
+
+def utc(at_ns: int) -> datetime:
+    """Return host nanoseconds as a UTC time; to the microsecond, without the rounding of a float."""
+    return _EPOCH + timedelta(microseconds=at_ns // 1000)
+
+
+def device_view(device: Device) -> models.Device:
+    """Return a device as it stands now."""
+    tracker, session = device.session.tracker, device.session
+    info, tally = tracker.info, tracker.tally
+    return models.Device(
+        id=device.id,
+        name=device.name,
+        address=device.address,
+        state=device.state,
+        reason=device.reason,
+        since=utc(device.since_ns),
+        session_since=utc(session.since_ns),
+        primary=tracker.primary,
+        steps=tracker.steps[tracker.primary],
+        steps_now=tracker.steps_now,
+        counters=tracker.steps,
+        cadence_spm=tracker.cadence_spm,
+        battery_percent=info.battery_percent,
+        rate_hz=info.rate_hz,
+        measured_rate_hz=tracker.measured_rate_hz,
+        rssi_dbm=device.rssi_dbm,
+        packets=tally.packets,
+        packets_bad=tally.packets_bad,
+        packets_duplicate=tally.packets_duplicate,
+        samples=tally.samples,
+        samples_lost=tally.samples_lost,
+        gaps=tally.gaps,
+        reboots=tally.reboots,
+        manufacturer=info.manufacturer,
+        model=info.model,
+        firmware=info.firmware,
+    )
+
+
+def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:
+    """Return a notice as the live feed tells it."""
+    if isinstance(notice.event, DeviceChanged):
+        value = device_view(supervisor.device(notice.device))
+        return models.DeviceEvent(device=notice.device, at=utc(notice.at_ns), value=value)
+    if isinstance(notice.event, Signal | Counting):
+        return _ephemeral_view(notice, notice.event)
+    return durable_view(notice)
+
+
+def durable_view(notice: Notice) -> models.StepEvent | models.StateEvent | models.GapEvent | models.RebootEvent:
+    """Return a durable notice as an event."""
+    device, at, ordinal, event = notice.device, utc(notice.at_ns), notice.ordinal or 0, notice.event
+    match event:
+        case StepCounted():
+            return step_view(notice)
+        case StateChanged(state=state, reason=reason):
+            return models.StateEvent(device=device, at=at, ordinal=ordinal, state=state, reason=reason)
+        case Gap():
+            return models.GapEvent(
+                device=device,
+                at=at,
+                ordinal=ordinal,
+                from_s=event.from_s,
+                to_s=event.to_s,
+                samples=event.samples,
+                filled=event.filled,
+            )
+        case Rebooted(boot=boot, previous=previous):
+            return models.RebootEvent(device=device, at=at, ordinal=ordinal, boot=boot, previous=previous)
+        case _:
+            raise TypeError(f"{event!r} is not durable")
+
+
+def step_view(notice: Notice) -> models.StepEvent:
+    """Return a step's notice as an event."""
+    event = notice.event
+    if not isinstance(event, StepCounted):
+        raise TypeError(f"{event!r} is no step")
+    step = event.step
+    return models.StepEvent(
+        device=notice.device,
+        at=utc(notice.at_ns),
+        ordinal=notice.ordinal or 0,
+        device_s=step.at_s,
+        boot=event.boot,
+        counter=event.counter,
+        steps=event.steps,
+        strength=step.strength,
+        interval_s=step.interval_s,
+        peak=step.peak,
+        valley=step.valley,
+        upper=step.upper,
+        lower=step.lower,
+    )
+
+
+def _ephemeral_view(notice: Notice, event: Signal | Counting) -> models.SignalEvent | models.CountingEvent:
+    device, at = notice.device, utc(notice.at_ns)
+    if isinstance(event, Counting):
+        return models.CountingEvent(
+            device=device,
+            at=at,
+            now_s=event.now_s,
+            steps=event.steps,
+            steps_now=event.steps_now,
+            cadence_spm=event.cadence_spm,
+        )
+    values = [round(float(value), _SIGNAL_DIGITS) for value in event.values]
+    bands = [_band_view(band) for band in event.bands]
+    return models.SignalEvent(device=device, at=at, from_s=event.from_s, values=values, bands=bands)
+
+
+def _band_view(band: Band) -> models.BandModel:
+    return models.BandModel(from_s=band.from_s, to_s=band.to_s, upper=band.upper, lower=band.lower)
