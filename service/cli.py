@@ -1,0 +1,283 @@
+"""The commands: `steplink demo`, `serve`, `scan`, `sim`.
+
+Ctrl-C or SIGTERM ends each cleanly with exit code 0; a wrong option, file or port ends it with one line and exit code
+2; no Bluetooth with one line and exit code 3. Nothing heavy is imported before a command needs it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import dataclasses
+import math
+import signal
+import sys
+from collections.abc import Callable, Coroutine, Sequence
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from service.config import Settings
+from service.errors import LinkError, SteplinkError
+
+if TYPE_CHECKING:
+    from device_sim.gatt import GattBracelet
+    from device_sim.source import Source
+    from service.links.ble import Backend
+    from service.pipeline.supervisor import Supervisor
+
+USAGE_ERROR = 2
+NO_BLUETOOTH = 3
+DEFAULT_AIR = "127.0.0.1:7400"
+DEMO_WALK = "normal:30,slow:20,rest:6,typing:8,fast:20,run:15,rest:5"
+
+Command = Callable[[argparse.Namespace], Coroutine[Any, Any, None]]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code."""
+    options = _parser().parse_args(argv)
+    try:
+        asyncio.run(_stoppable(options.command(options)))
+    except (KeyboardInterrupt, asyncio.CancelledError):
+        return 0
+    except LinkError as error:
+        print(f"steplink: {error}", file=sys.stderr)
+        return NO_BLUETOOTH
+    except SteplinkError as error:
+        print(f"steplink: {error}", file=sys.stderr)
+        return USAGE_ERROR
+    return 0
+
+
+async def _stoppable(work: Coroutine[Any, Any, None]) -> None:
+    """Await `work`; SIGTERM cancels it as Ctrl-C does."""
+    task = asyncio.current_task()
+    if task is not None:
+        with contextlib.suppress(NotImplementedError):  # Windows has no signal handlers on its loop
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+    await work
+
+
+async def _demo(options: argparse.Namespace) -> None:
+    """A bracelet, a radio and the service in this process."""
+    from device_sim.air import LocalAir  # noqa: PLC0415
+    from service.links.ble import Backend  # noqa: PLC0415
+
+    settings = _settings(options)
+    bracelet = _bracelet(options)
+    async with LocalAir() as air, _on_air(air, bracelet, options), air.central() as central:
+        backend = Backend(scanner=central.scanner, client=central.client)
+        await _serve_with(settings, _supervisor(settings, backend, wanted=None))
+
+
+async def _serve(options: argparse.Namespace) -> None:
+    """The service, over this machine's Bluetooth or a virtual air."""
+    settings = _settings(options)
+    async with _backend(options.air) as backend:
+        await _serve_with(settings, _supervisor(settings, backend, wanted=options.connect))
+
+
+async def _scan(options: argparse.Namespace) -> None:
+    """List the bracelets that are near."""
+    from service.links.ble import find  # noqa: PLC0415
+    from service.wearables.bracelet import Bracelet  # noqa: PLC0415
+
+    async with _backend(options.air) as backend:
+        print(f"scanning for {options.seconds:g} s …", file=sys.stderr)
+        found = await find(Bracelet.services, for_s=options.seconds, backend=backend)
+    print(f"{'address':<20} {'name':<12} {'signal':>8}")
+    for sighting in found:
+        print(f"{sighting.address:<20} {sighting.name or '–':<12} {sighting.rssi_dbm:>4} dBm")
+    if not found:
+        print("none found: is the bracelet on, near and not connected elsewhere?", file=sys.stderr)
+
+
+async def _sim(options: argparse.Namespace) -> None:
+    """A bracelet on a virtual air, for `steplink serve --air` in another terminal."""
+    from device_sim.air_tcp import hosted_air  # noqa: PLC0415
+
+    bracelet = _bracelet(options)
+    async with hosted_air(options.air) as air, _on_air(air, bracelet, options) as played:
+        print(f"bracelet {bracelet.device_id} is on the air at {options.air}; in another terminal:", flush=True)
+        print(f"    steplink serve --air {options.air}", flush=True)
+        await played.played.wait()
+        print("the recording has been played")
+
+
+async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
+    from service.api.app import create_app  # noqa: PLC0415
+    from service.api.server import address, listen, serve  # noqa: PLC0415
+
+    bound = listen(settings.host, settings.port)
+    url = address(bound)
+
+    def ready() -> None:
+        print(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)", flush=True)
+
+    await serve(create_app(supervisor), bound, on_ready=ready)
+
+
+def _supervisor(settings: Settings, backend: Backend, wanted: Sequence[str] | None) -> Supervisor:
+    from service.counters.registry import make  # noqa: PLC0415
+    from service.pipeline.hub import Hub  # noqa: PLC0415
+    from service.pipeline.supervisor import Supervisor  # noqa: PLC0415
+    from service.tracking.tracker import Tracker  # noqa: PLC0415
+    from service.wearables.bracelet import Bracelet  # noqa: PLC0415
+
+    name, preset = settings.counter, settings.preset
+    make(name, preset=preset)  # a wrong name is told now, not at the first device
+    return Supervisor(
+        hub=Hub(durable_limit=settings.durable_limit),
+        make_wearable=Bracelet,
+        make_tracker=lambda wearable: Tracker(wearable, {name: lambda: make(name, preset=preset)}, primary=name),
+        wanted=wanted or None,
+        backend=backend,
+    )
+
+
+@contextlib.asynccontextmanager
+async def _backend(air: str | None) -> Any:  # noqa: ANN401
+    """Yield bleak's backend: the platform's own, or a central on the virtual air at `air`."""
+    from service.links.ble import PLATFORM, Backend  # noqa: PLC0415
+
+    if air is None:
+        yield PLATFORM
+        return
+    from device_sim.air_tcp import remote_central  # noqa: PLC0415
+
+    async with remote_central(air) as central:
+        yield Backend(scanner=central.scanner, client=central.client)
+
+
+def _on_air(air: Any, bracelet: Any, options: argparse.Namespace) -> GattBracelet:  # noqa: ANN401
+    from device_sim.gatt import Start  # noqa: PLC0415
+
+    start = Start.ON_SUBSCRIBE if options.recording else Start.POWER_ON
+    device: GattBracelet = air.bracelet(bracelet, name=options.name, speed=options.speed, start=start)
+    return device
+
+
+def _bracelet(options: argparse.Namespace) -> Any:  # noqa: ANN401
+    import time  # noqa: PLC0415
+
+    from device_sim.bracelet import Bracelet  # noqa: PLC0415
+
+    # Boots count upwards for ever; a simulated bracelet keeps no flash memory, so the clock counts for it.
+    return Bracelet(
+        _source(options), device_id=options.id, boot=int(time.time()), packet_samples=options.packet_samples
+    )
+
+
+def _source(options: argparse.Namespace) -> Source:
+    from device_sim.source import RecordingSource, WalkerSource  # noqa: PLC0415
+
+    if options.recording is None:
+        return WalkerSource(options.walk, seed=options.seed, loop=not options.once)
+    from service.recordings import read  # noqa: PLC0415
+
+    return RecordingSource(read(options.recording, lsb_per_g=options.lsb_per_g), loop=not options.once)
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    return Settings(**{field.name: getattr(options, field.name) for field in dataclasses.fields(Settings)})
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="steplink", description="Live step counts of Bluetooth LE wearables.")
+    parser.add_argument("--version", action="version", version=f"steplink {version('steplink')}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    demo = _command(commands, "demo", _demo, "see it work: a simulated bracelet, its radio and the service in one")
+    _add_settings(demo)
+    _add_bracelet(demo)
+    serve = _command(commands, "serve", _serve, "run the service")
+    _add_settings(serve)
+    _add_air(serve)
+    serve.add_argument(
+        "--connect",
+        action="append",
+        metavar="NAME",
+        help="connect to the device of this name or address only, and again after each loss; may be repeated"
+        " (default: every bracelet heard)",
+    )
+    scan = _command(commands, "scan", _scan, "list the bracelets that are near")
+    scan.add_argument(
+        "--seconds", type=_number(0.1, 600), default=5.0, help="how long to listen, 0.1–600 s (default 5)"
+    )
+    _add_air(scan)
+    sim = _command(commands, "sim", _sim, "run a simulated bracelet for `serve --air` in another terminal")
+    sim.add_argument(
+        "--air", metavar="HOST:PORT", default=DEFAULT_AIR, help=f"where its radio is (default {DEFAULT_AIR})"
+    )
+    _add_bracelet(sim)
+    return parser
+
+
+def _command(commands: Any, name: str, command: Command, text: str) -> argparse.ArgumentParser:  # noqa: ANN401
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+    parser.set_defaults(command=command)
+    return parser
+
+
+def _add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add an option for each of the service's settings."""
+    for field in dataclasses.fields(Settings):
+        meta = field.metadata
+        span = f", {meta['low']}–{meta['high']} {meta['unit']}" if meta["low"] is not None else ""
+        parser.add_argument(
+            f"--{field.name.replace('_', '-')}",
+            type=type(field.default),
+            default=field.default,
+            metavar=(meta["unit"] or "TEXT").upper(),
+            help=f"{meta['text']}{span} (default {field.default})",
+        )
+
+
+def _add_air(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--air",
+        metavar="HOST:PORT",
+        nargs="?",
+        const=DEFAULT_AIR,
+        help=f"use the virtual radio of `steplink sim` there ({DEFAULT_AIR}) instead of this machine's Bluetooth",
+    )
+
+
+def _add_bracelet(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--recording", metavar="FILE", help="play this recording (.npz, .csv, the paper's layout)")
+    parser.add_argument(
+        "--lsb-per-g",
+        type=_number(1, 65535),
+        default=32.0,
+        help="scale of a recording in raw units, LSB/g (default 32)",
+    )
+    parser.add_argument(
+        "--walk", default=DEMO_WALK, help=f"what a synthetic walker does, in s each (default {DEMO_WALK})"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="another seed, another walker (default 1)")
+    parser.add_argument(
+        "--speed", type=_number(0.01, math.inf), default=1.0, help="device seconds per second (default 1)"
+    )
+    parser.add_argument("--once", action="store_true", help="play once instead of for ever")
+    parser.add_argument("--name", default="Steplink", help="advertised name, at most 8 bytes (default Steplink)")
+    parser.add_argument("--id", default="sim-1", help="the bracelet's own id, 1–20 bytes (default sim-1)")
+    parser.add_argument(
+        "--packet-samples",
+        type=int,
+        default=10,
+        help="most samples of one packet; 0 fills the MTU, 10 at 50 Hz are 0.2 s (default 10)",
+    )
+
+
+def _number(low: float, high: float) -> Callable[[str], float]:
+    def number(text: str) -> float:
+        value = float(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not in {low:g}–{high:g}")
+        return value
+
+    return number
+
+
+if __name__ == "__main__":
+    sys.exit(main())
