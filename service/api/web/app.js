@@ -12,6 +12,7 @@ import { duration, localTime, whole, zone } from "./format.js";
 
 const ANNOUNCE_MS = 10_000;
 const SECOND_MS = 1_000;
+const HEALTH_MS = 5_000;
 
 const $ = (id) => document.getElementById(id);
 const devices = new Devices();
@@ -36,6 +37,7 @@ function follow({ state, retryAtMs }) {
   server.retryAtMs = retryAtMs;
   if (state === "open") server.lostAt = null;
   else if (state === "waiting") server.lostAt ??= new Date();
+  dirty = true;
   showServer();
 }
 
@@ -63,7 +65,9 @@ async function act(device, verb) {
     const answer = await fetch(url, { method: "POST", signal: AbortSignal.timeout(SECOND_MS * 10) });
     return answer.ok ? null : `The server refused to ${verb}: ${answer.status} ${answer.statusText}`;
   } catch {
-    return `The server did not answer the wish to ${verb}. Try again when it is back.`;
+    return `The server did not answer the request to ${verb}. Try again when it is back.`;
+  } finally {
+    dirty = true;
   }
 }
 
@@ -81,11 +85,21 @@ function showDevices() {
       $("devices").append(card.element);
       card.restyle();
     }
-    cards.get(entry).show(entry.device, devices.serverNow());
+    cards.get(entry).show(entry.device, devices.serverNow(), server.lostAt !== null);
   }
-  $("empty").hidden = entries.length > 0 || !server.known;
+  const empty = entries.length === 0 && server.known;
+  if (empty && $("empty").hidden) setTimeout(showTrouble);
+  $("empty").hidden = !empty;
   $("devices").classList.toggle("several", entries.length > 1);
   document.title = entries.length === 1 ? `${whole(entries[0].device.steps_now)} steps · steplink` : "steplink";
+}
+
+/** While there is no bracelet, say whether the server's Bluetooth is the reason. */
+async function showTrouble() {
+  if ($("empty").hidden || server.state !== "open") return;
+  const health = await fetch(new URL("healthz", document.baseURI)).then((answer) => answer.json()).catch(() => null);
+  $("trouble").hidden = !health?.reason;
+  setText("trouble", health?.reason ? `Bluetooth does not work on the server: ${health.reason}` : "");
 }
 
 function announce(nowMs) {
@@ -126,5 +140,6 @@ setInterval(() => {
   dirty = true;
   showServer();
 }, SECOND_MS);
+setInterval(showTrouble, HEALTH_MS);
 feed.connect();
 requestAnimationFrame(frame);

@@ -14,6 +14,7 @@ const STATES = {
   streaming: "Live",
   lost: "Lost",
   disconnected: "Disconnected",
+  stale: "Not up to date",
 };
 /** States in which the server holds the device or tries to; the button then offers to let it go. */
 const HELD = new Set(["connecting", "streaming", "lost"]);
@@ -26,7 +27,8 @@ export class Card {
   #plot;
   #act;
   #asked = null;
-  #state = null;
+  #error = null;
+  #before = null;
   #steps = null;
 
   /** `act(device, verb)` asks the server to "connect" or "disconnect" and resolves to an error's text or null. */
@@ -37,8 +39,11 @@ export class Card {
     this.#act = act;
   }
 
-  /** Fill the card from `device`; `now` is the server's clock. */
-  show(device, now) {
+  /** Fill the card from `device`; `now` is the server's clock; `stale` says that the server itself is not reached. */
+  show(device, now, stale = false) {
+    if (device.state !== this.#before) this.#error = null;
+    this.#before = device.state;
+    this.#state(stale ? "stale" : device.state);
     this.#head(device, now);
     this.#numbers(device);
     this.#facts(device, now);
@@ -52,16 +57,19 @@ export class Card {
     this.#plot.restyle();
   }
 
+  #state(state) {
+    this.element.dataset.state = state;
+    this.#fields.icon.setAttribute("href", `#i-${state in STATES ? state : "seen"}`);
+    this.#text("state", STATES[state] ?? state);
+  }
+
   #head(device, now) {
-    const { state, manufacturer, model, firmware, id } = device;
+    const { manufacturer, model, firmware, id } = device;
     const name = device.name || model || id;
     this.#text("name", name);
     const made = [manufacturer, model, firmware && `firmware ${firmware}`].filter(Boolean).join(" ");
     this.#text("model", made ? `${made} · ${id}` : id);
-    this.element.dataset.state = state;
-    this.#fields.icon.setAttribute("href", `#i-${state in STATES ? state : "seen"}`);
-    this.#text("state", STATES[state] ?? state);
-    this.#text("notice", notice(device, now));
+    this.#text("notice", this.#error ?? notice(device, now));
     this.#fields.notice.hidden = !this.#fields.notice.textContent;
     this.#fields.canvas.setAttribute("aria-label", `The last ten seconds of ${name}: filtered acceleration in g, `
       + "both thresholds, and a mark at each counted step.");
@@ -77,8 +85,6 @@ export class Card {
   }
 
   #button(device, name) {
-    if (device.state !== this.#state) this.#asked = null;
-    this.#state = device.state;
     const verb = HELD.has(device.state) ? "disconnect" : "connect";
     const { button } = this.#fields;
     this.#text("button", verb === "connect" ? "Connect" : "Disconnect");
@@ -91,13 +97,10 @@ export class Card {
   async #ask(device, verb) {
     if (this.#asked) return;
     this.#asked = verb;
+    this.#error = null;
     this.#fields.button.setAttribute("aria-disabled", "true");
-    const error = await this.#act(device, verb);
+    this.#error = await this.#act(device, verb);
     this.#asked = null;
-    this.#fields.button.setAttribute("aria-disabled", "false");
-    if (error === null) return;
-    this.#text("notice", error);
-    this.#fields.notice.hidden = false;
   }
 
   #numbers({ state, steps, steps_now, cadence_spm }) {
@@ -124,7 +127,8 @@ export class Card {
     this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`);
     this.#text("gaps", whole(device.gaps));
     this.#text("gaps-more", plural(device.reboots, "restart"));
-    this.#text("rate", measured(device.rate_hz, 1, "Hz"));
+    this.#text("rate", measured(device.measured_rate_hz ?? device.rate_hz, 1, "Hz"));
+    this.#text("rate-more", device.measured_rate_hz == null ? "nominal" : "measured");
     this.#text("rssi", measured(device.rssi_dbm, 0, "dBm"));
     this.#text("rssi-more", strength(device.rssi_dbm));
     const since = device.session_since;
@@ -150,7 +154,7 @@ export function notice({ state, reason, since }, now) {
   const why = reason ? ` (${reason})` : "";
   const at = localTime(since, now);
   if (state === "lost") {
-    return `No contact since ${at}, for ${duration((now - new Date(since)) / 1000)}${why}. `
+    return `Contact lost at ${at}, ${duration((now - new Date(since)) / 1000)} ago${why}. `
       + "It comes back by itself once it is in range.";
   }
   if (state === "disconnected") return `Disconnected since ${at}${why}.`;

@@ -15,9 +15,8 @@ export class Devices {
     if (message.type === "snapshot") return this.#snapshot(message);
     if (message.type === "device") return this.#put(message.value);
     const entry = this.#entries.get(message.device);
-    const take = TAKERS[message.type];
-    if (!entry || !take) return false;
-    take(entry, message, nowMs);
+    if (!entry || !Object.hasOwn(TAKERS, message.type)) return false;
+    TAKERS[message.type](entry, message, nowMs);
     return true;
   }
 

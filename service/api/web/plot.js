@@ -10,10 +10,12 @@ export const WINDOW_S = 10;
 export const DECIDING_S = 2.5;
 /** A hole this long in the signal is a gap; a shorter one is a message that was merged away. */
 const HOLE_S = 0.12;
+/** A hole that reaches the right edge may still be filled by what is on its way. */
+const OPEN_HOLE_S = 1;
 const POP_MS = 450;
 /** Smallest height of the picture in g, so that rest looks like rest. */
 const LEAST_SPAN_G = 0.6;
-const PAD = { top: 14, right: 14, bottom: 26, left: 40 };
+const PAD = { top: 24, right: 14, bottom: 26, left: 40 };
 const TICKS_G = [0.1, 0.2, 0.5, 1, 2, 5, 10];
 const RANGE_PER_S = 3;
 
@@ -25,17 +27,17 @@ export function ticks(low, high) {
   return Array.from({ length: count }, (_, i) => Number(((first + i) * step).toFixed(6)));
 }
 
-/** Return [from, to] of each stretch of [fromS, toS] without samples that is at least HOLE_S long. */
+/** Return [from, to] of each stretch of [fromS, toS] without samples: HOLE_S long, OPEN_HOLE_S where it goes on. */
 export function holes(trace, fromS, toS) {
   const found = [];
   const last = Math.floor(toS * trace.rateHz);
   let since = null;
   for (let k = Math.ceil(fromS * trace.rateHz); k <= last + 1; k += 1) {
     const missing = k <= last && Number.isNaN(trace.at(k));
-    if (missing && since === null) since = k;
+    if (missing) since ??= k;
     if (missing || since === null) continue;
     const hole = [(since - 1) / trace.rateHz, k / trace.rateHz];
-    if (hole[1] - hole[0] >= HOLE_S) found.push(hole);
+    if (hole[1] - hole[0] >= (k > last ? OPEN_HOLE_S : HOLE_S)) found.push(hole);
     since = null;
   }
   return found;
@@ -73,15 +75,18 @@ export class Plot {
     const frame = this.#frame(edge, width, height, nowMs);
     this.#context.clearRect(0, 0, width, height);
     this.#axes(frame);
-    if (edge === null) return;
+    if (edge === null) {
+      this.#waiting(frame);
+      return;
+    }
     this.#context.save();
     this.#context.beginPath();
     this.#context.rect(PAD.left, 0, frame.right - PAD.left, height);
     this.#context.clip();
-    this.#gaps(frame);
     this.#thresholds(frame);
     this.#signal(frame);
     this.#deciding(frame);
+    this.#gaps(frame);
     this.#marks(frame, nowMs, motion);
     this.#context.restore();
   }
@@ -155,6 +160,12 @@ export class Plot {
     this.#line(PAD.left, bottom, right, bottom);
   }
 
+  #waiting({ right, bottom }) {
+    const c = this.#context;
+    c.textAlign = "center";
+    c.fillText("The signal appears here", (PAD.left + right) / 2, (PAD.top + bottom) / 2 - 8);
+  }
+
   #gaps({ edge, fromS, right, bottom, x }) {
     const c = this.#context;
     const known = this.#trace.gaps.map(({ fromS: from, toS: to }) => [from, to]);
@@ -224,7 +235,9 @@ export class Plot {
     c.stroke();
   }
 
+  /** Veil what is not decided yet; where no signal comes there is nothing to decide. */
   #deciding({ edge, right, bottom, x }) {
+    if (this.#trace.valueAt(edge - OPEN_HOLE_S) === null) return;
     const c = this.#context;
     const left = x(edge - DECIDING_S);
     c.globalAlpha = 0.55;
@@ -233,7 +246,7 @@ export class Plot {
     c.globalAlpha = 1;
     c.fillStyle = this.#colours["ink-soft"];
     c.textAlign = "right";
-    c.fillText("deciding", right - 4, PAD.top + 10);
+    c.fillText("deciding…", right - 2, PAD.top - 8);
     c.strokeStyle = this.#colours.grid;
     c.lineWidth = 1;
     this.#line(left, PAD.top, left, bottom);

@@ -1,0 +1,164 @@
+"""What the page shows of what the feed says."""
+
+import re
+
+from browser.conftest import Scripted
+from browser.scripted import AT, counting, device, signal, state, step
+from playwright.sync_api import Locator, Page, expect
+
+
+def field(page: Page, name: str) -> Locator:
+    return page.locator(f'.card [data-f="{name}"]')
+
+
+def test_without_a_bracelet_the_page_says_what_to_do(scripted: Scripted) -> None:
+    page = scripted().open()
+    expect(page.get_by_role("heading", name="No bracelet yet")).to_be_visible()
+    expect(page.get_by_role("listitem")).to_have_count(3)
+    expect(page.locator("#trouble")).to_be_hidden()
+
+
+def test_without_a_bracelet_the_page_says_why_bluetooth_fails(scripted: Scripted) -> None:
+    server = scripted()
+    server.health = {"reason": "no adapter"}
+    expect(server.open().locator("#trouble")).to_have_text("Bluetooth does not work on the server: no adapter")
+
+
+def test_a_newly_seen_device_replaces_the_empty_state(scripted: Scripted) -> None:
+    server = scripted()
+    page = server.open()
+    server.send({"type": "device", "device": "SL-0001", "at": AT, "value": device(state="seen", name=None)})
+    expect(page.get_by_role("heading", name="Bracelet", exact=True)).to_be_visible()
+    expect(page.locator("#empty")).to_be_hidden()
+    expect(field(page, "state")).to_have_text("In range, not connected")
+
+
+def test_pending_steps_stand_apart_from_confirmed_ones(scripted: Scripted) -> None:
+    server = scripted(device(steps=40, steps_now=42))
+    page = server.open()
+    expect(field(page, "steps-now")).to_have_text("42")
+    expect(field(page, "steps")).to_have_text("40")
+    expect(field(page, "pending-chip")).to_have_text("+2 pending")
+    server.send(counting(42, 42))
+    expect(field(page, "steps")).to_have_text("42")
+    expect(field(page, "pending-chip")).to_be_hidden()
+
+
+def test_the_count_now_may_fall(scripted: Scripted) -> None:
+    server = scripted(device(steps=40, steps_now=42))
+    page = server.open()
+    server.send(counting(40, 40, None))
+    expect(field(page, "steps-now")).to_have_text("40")
+    expect(field(page, "cadence")).to_have_text("–")
+
+
+def test_a_step_of_the_primary_counter_raises_the_count_and_another_counters_does_not(scripted: Scripted) -> None:
+    server = scripted(device(counters={"double_threshold": 40, "adaptive_peak": 39}))
+    page = server.open()
+    server.send(step(1, 1.0, 999, counter="adaptive_peak"), step(2, 1.0, 43))
+    expect(field(page, "steps-now")).to_have_text("43")
+    expect(field(page, "steps")).to_have_text("43")
+    expect(field(page, "others")).to_have_text("adaptive peak 999")
+
+
+def test_battery_packets_and_losses_are_told(scripted: Scripted) -> None:
+    page = scripted(device()).open()
+    shown = {name: field(page, name).inner_text().replace("\u00a0", " ") for name in (
+        "battery", "packets", "packets-more", "lost", "lost-more", "gaps", "gaps-more", "rate", "rssi", "cadence",
+    )}  # fmt: skip
+    assert shown == {
+        "battery": "87 %", "packets": "1,234", "packets-more": "2 bad, 3 repeated", "lost": "1.0 %",
+        "lost-more": "100 of 10,000", "gaps": "4", "gaps-more": "1 restart", "rate": "50.0 Hz", "rssi": "−58 dBm",
+        "cadence": "108",
+    }  # fmt: skip
+
+
+def test_unknown_values_are_dashes(scripted: Scripted) -> None:
+    page = scripted(device(rate_hz=None, measured_rate_hz=None, rssi_dbm=None, battery_percent=None, cadence_spm=None,
+                           samples=0, samples_lost=0, session_since=None)).open()  # fmt: skip
+    for name in ("rate", "rssi", "cadence", "lost", "session"):
+        expect(field(page, name)).to_have_text("–")
+    expect(page.locator(".battery")).to_be_hidden()
+
+
+def test_a_lost_bracelet_is_shown_as_lost_since_when_and_comes_back(scripted: Scripted) -> None:
+    server = scripted(device())
+    page = server.open()
+    expect(field(page, "state")).to_have_text("Live")
+    server.send(state(1, "lost", "no data for 3 s"))
+    expect(field(page, "state")).to_have_text("Lost")
+    expect(field(page, "icon")).to_have_attribute("href", "#i-lost")
+    expect(field(page, "notice")).to_contain_text(re.compile(r"Contact lost at .*14:03:12 (CEST|GMT\+2).*\(no data"))
+    expect(field(page, "cadence")).to_have_text("–")
+    server.send(state(2, "streaming"))
+    expect(field(page, "state")).to_have_text("Live")
+    expect(field(page, "notice")).to_be_hidden()
+
+
+def test_every_state_has_its_own_word_and_icon(scripted: Scripted) -> None:
+    server = scripted(device())
+    page = server.open()
+    seen = set()
+    for ordinal, word in enumerate(("connecting", "lost", "disconnected", "seen", "streaming")):
+        server.send(state(ordinal, word))
+        expect(page.locator(".card")).to_have_attribute("data-state", word)
+        icon = field(page, "icon").get_attribute("href") or ""
+        assert page.locator(f"symbol{icon}").count() == 1
+        seen.add((field(page, "state").inner_text(), icon))
+    assert len({text for text, _ in seen}) == len({icon for _, icon in seen}) == 5
+
+
+def test_the_button_asks_the_server_and_follows_the_state(scripted: Scripted) -> None:
+    server = scripted(device(state="disconnected"))
+    page = server.open()
+    page.get_by_role("button", name="Connect Left wrist").click()
+    server.send(state(1, "streaming"))
+    page.get_by_role("button", name="Disconnect Left wrist").click()
+    expect(page.get_by_role("button", name="Disconnect Left wrist")).to_have_attribute("aria-disabled", "false")
+    assert server.posts == ["api/v1/devices/SL-0001/connect", "api/v1/devices/SL-0001/disconnect"]
+
+
+def test_a_refused_request_is_told(scripted: Scripted) -> None:
+    server = scripted(device(id="C0:FF:EE/1"))
+    server.answer = 404
+    page = server.open()
+    page.get_by_role("button", name="Disconnect").click()
+    expect(field(page, "notice")).to_contain_text("The server refused to disconnect: 404")
+    assert server.posts == ["api/v1/devices/C0%3AFF%3AEE%2F1/disconnect"]
+    assert len(server.errors) == 1
+    server.errors.clear()
+
+
+def test_an_id_that_replaces_an_address_keeps_the_card(scripted: Scripted) -> None:
+    address = "C0:FF:EE:00:00:01"
+    server = scripted(device(id=address), device(id="SL-0002", address="C0:FF:EE:00:00:02", name="Right"))
+    page = server.open()
+    page.locator(".card").first.evaluate("card => card.dataset.mark = 'kept'")
+    server.send({"type": "device", "device": "SL-0001", "at": AT, "value": device(steps_now=77)}, counting(77, 78))
+    expect(field(page, "steps-now").first).to_have_text("78")
+    expect(page.locator(".card")).to_have_count(2)
+    expect(page.locator(".card").first).to_have_attribute("data-mark", "kept")
+
+
+def test_what_is_not_understood_is_ignored(scripted: Scripted) -> None:
+    server = scripted(device())
+    page = server.open()
+    server.send("no JSON", "[]", "null", '{"type": 3}', {"type": "weather"}, counting(1, 1) | {"device": "other"})
+    server.send({"type": "toString", "device": "SL-0001"}, counting(50, 51))
+    expect(field(page, "steps-now")).to_have_text("51")
+
+
+def test_a_name_is_text_and_never_markup(scripted: Scripted) -> None:
+    name = "<img src=x onerror=alert(1)><b>x</b>"
+    page = scripted(device(name=name)).open()
+    expect(field(page, "name")).to_have_text(name)
+    assert page.locator(".card img, .card h2 b").count() == 0
+
+
+def test_a_reboot_forgets_the_signal_and_keeps_the_count(scripted: Scripted) -> None:
+    server = scripted(device())
+    page = server.open()
+    server.send(signal(500, 5), {"type": "reboot", "device": "SL-0001", "ordinal": 1, "at": AT, "boot": 2})
+    server.send(signal(0, 2), counting(44, 44))
+    expect(field(page, "steps-now")).to_have_text("44")
+    expect(field(page, "gaps-more")).to_have_text("2 restarts")
