@@ -60,7 +60,7 @@ async def _stoppable(work: Coroutine[Any, Any, None]) -> None:
 
 
 async def _demo(options: argparse.Namespace) -> None:
-    """A bracelet, a radio and the service in this process."""
+    """Run a bracelet, a radio and the service in this process."""
     from device_sim.air import LocalAir  # noqa: PLC0415
     from service.links.ble import Backend  # noqa: PLC0415
 
@@ -72,7 +72,7 @@ async def _demo(options: argparse.Namespace) -> None:
 
 
 async def _serve(options: argparse.Namespace) -> None:
-    """The service, over this machine's Bluetooth or a virtual air."""
+    """Run the service, over this machine's Bluetooth or a virtual air."""
     settings = _settings(options)
     async with _backend(options.air) as backend:
         await _serve_with(settings, _supervisor(settings, backend, wanted=options.connect))
@@ -94,7 +94,7 @@ async def _scan(options: argparse.Namespace) -> None:
 
 
 async def _sim(options: argparse.Namespace) -> None:
-    """A bracelet on a virtual air, for `steplink serve --air` in another terminal."""
+    """Put a bracelet on a virtual air, for `steplink serve --air` in another terminal."""
     from device_sim.air_tcp import hosted_air  # noqa: PLC0415
 
     bracelet = _bracelet(options)

@@ -19,7 +19,17 @@ MESSAGE_BYTES = 65_536
 
 
 class _Server(uvicorn.Server):
-    """uvicorn without its signal handlers: the command owns them."""
+    """uvicorn without its signal handlers (the command owns them), that says when it answers."""
+
+    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start answering, and say so."""
+        await super().startup(sockets)
+        if not self.should_exit:
+            self._on_ready()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -57,13 +67,9 @@ async def serve(app: FastAPI, bound: socket.socket, *, on_ready: Callable[[], No
         ws_max_size=MESSAGE_BYTES,
         timeout_graceful_shutdown=GRACE_S,
     )
-    server = _Server(config)
+    server = _Server(config, on_ready)
     running = asyncio.create_task(server.serve(sockets=[bound]), name="http server")
     try:
-        while not server.started and not running.done():
-            await asyncio.sleep(0.01)
-        if server.started:
-            on_ready()
         await asyncio.shield(running)
     finally:
         server.should_exit = True

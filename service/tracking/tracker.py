@@ -120,6 +120,7 @@ class Tracker:
         """Return the whole state as plain data."""
         return {
             "said": {uuid: data.hex() for uuid, data in self._said.items()},
+            "info": dataclasses.asdict(self.info),
             "tally": dataclasses.asdict(self.tally),
             "steps": dict(self.steps),
             "steps_now": self.steps_now,
@@ -135,6 +136,8 @@ class Tracker:
         """Take over a snapshot's state; SnapshotError where its counters are not ours."""
         for uuid, data in state["said"].items():
             self.apply(Packet(characteristic=uuid, data=bytes.fromhex(data), at_ns=0))
+        clock = state["info"]["clock"]
+        self.info = DeviceInfo(**{**state["info"], "clock": clock and (clock[0], clock[1])})
         for name, counter in self._counters.items():
             counter.restore(state["counters"][name])
         self.tally = Tally(**state["tally"])

@@ -1,0 +1,72 @@
+"""Stand-ins that are simple enough to be right by reading: a counter, and packets of a device that sends a ramp."""
+
+from collections.abc import Iterable, Iterator
+
+from service.counters.contract import Snapshot
+from service.samples import GRID_HZ, Packet, SampleBlock, Step, Update
+from service.wearables import bracelet as wire
+
+EVERY = 25
+"""The fake counter's step: each 25th grid sample, 120 steps a minute."""
+
+
+class MetronomeCounter:
+    """Counts a step at every 25th sample of the grid that it is given; pending while half way to the next."""
+
+    name = "metronome"
+    latency_s = 0.0
+
+    def __init__(self):
+        self.seen: list[tuple[int, int]] = []
+        self._next = 0
+
+    def update(self, block: SampleBlock) -> Update:
+        self.seen.append((block.start, len(block)))
+        ks = range(block.start, block.start + len(block))
+        self._next = ks.stop
+        steps = tuple(Step(at_s=k / GRID_HZ, strength=1.0, interval_s=0.5) for k in ks if k % EVERY == 0)
+        pending = int(self._next % EVERY > EVERY // 2)
+        return Update(steps=steps, pending=pending, trace_from_s=block.start / GRID_HZ, trace=block.acc_g[0])
+
+    def finish(self) -> Update:
+        return Update()
+
+    def snapshot(self) -> Snapshot:
+        return {"next": self._next}
+
+    def restore(self, state: Snapshot) -> None:
+        self._next = state["next"]
+
+
+def described(*, device="dev-1", boot=1, lsb_per_g=4096, rate_hz=50.0, clock=(0, 0)) -> Iterator[Packet]:
+    """The values a host reads from a bracelet after connecting."""
+    values = {
+        wire.DEVICE_ID: device.encode(),
+        wire.BOOT: wire.encode_boot(boot),
+        wire.SCALE: wire.encode_scale(lsb_per_g),
+        wire.RATE: wire.encode_rate(rate_hz),
+        wire.CLOCK: wire.encode_clock(*clock),
+    }
+    for uuid, data in values.items():
+        yield Packet(characteristic=uuid, data=data, at_ns=0)
+
+
+def tick_at(index: int, rate_hz: float = 50.0) -> int:
+    """The tick a bracelet with an ideal clock tells in a packet that starts at `index`."""
+    return int(wire.tick_index(index) * 1024 / rate_hz)
+
+
+def data_packet(index: int, n: int = 10, *, boot=1, rate_hz=50.0) -> Packet:
+    """n samples of a ramp: x is the sample's index modulo 1000, y 0, z 1 g."""
+    counts = [((index + i) % 1000, 0, 4096) for i in range(n)]
+    packet = wire.DataPacket(boot=boot, index=index, tick=tick_at(index, rate_hz), counts=counts)
+    at_ns = round((index + n) / rate_hz * 1e9) + 1_700_000_000_000_000_000
+    return Packet(characteristic=wire.DATA, data=wire.encode(packet), at_ns=at_ns)
+
+
+def data_packets(sizes: Iterable[int], *, start=0, boot=1, rate_hz=50.0) -> Iterator[Packet]:
+    """Packets of these sizes, one after the other."""
+    index = start
+    for n in sizes:
+        yield data_packet(index, n, boot=boot, rate_hz=rate_hz)
+        index += n

@@ -1,0 +1,29 @@
+"""Compiled kernels: the same function, its callees included."""
+
+import importlib
+
+import pytest
+
+from service.signals import compiled as module
+from service.signals.compiled import compiled
+
+
+def half(value):
+    return value / 2
+
+
+def kernel(value):
+    return half(value) + 1
+
+
+def test_callees_are_compiled_too():
+    pytest.importorskip("numba")
+    fast = compiled(kernel)
+    assert fast is not kernel
+    assert fast(3.0) == kernel(3.0)
+
+
+def test_without_numba_the_plain_function_runs(monkeypatch):
+    fresh = importlib.reload(module)
+    monkeypatch.setattr(fresh, "available", lambda: False)
+    assert fresh.compiled(kernel) is kernel

@@ -1,0 +1,150 @@
+"""Device time: packets of any size, any rate and any drift give one grid, and what was emitted never changes."""
+
+import itertools
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.samples import TICK_EVERY, RawBlock
+from service.signals.timebase import FILL_S, Timebase
+
+WRAP = 1 << 16
+
+
+def value(i):
+    return math.sin(0.3 * i)
+
+
+def block(index, n, true_hz, *, tick=True, array=False, boot_tick=0):
+    column = [value(i) for i in range(index, index + n)]
+    if array:
+        column = np.array(column)
+    low = (boot_tick + int(1024 * (index - index % TICK_EVERY) / true_hz)) % WRAP
+    return RawBlock(boot=1, index=index, tick=low if tick else None, acc_g=(column, column, column))
+
+
+def run(timebase, sizes, true_hz, *, start=0, skip=(), **how):
+    """Feed blocks of these sizes; return grid samples by index, and the gaps."""
+    grid, gaps, index = {}, [], start
+    for n in sizes:
+        if index not in skip:
+            samples, gap = timebase.feed(block(index, n, true_hz, **how))
+            grid.update(zip(itertools.count(samples.start), samples.acc_g[0], strict=False))
+            gaps += [gap] if gap else []
+        index += n
+    return grid, gaps
+
+
+def test_a_device_on_the_grid_passes_through_untouched():
+    grid, gaps = run(Timebase(50), [10] * 200, 50)
+    assert grid == {k: value(k) for k in range(2000)}
+    assert gaps == []
+
+
+@pytest.mark.parametrize(
+    ("nominal", "true"), [(50, 50.01), (50, 49.2), (100, 104), (25, 25), (12.5, 12.49), (52, 52.3)]
+)
+@given(seed=st.integers(0, 1000))
+def test_packet_size_changes_nothing(nominal, true, seed):
+    sizes = np.random.default_rng(seed).integers(1, 85, 60).tolist()
+    total = sum(sizes)
+    by_ten = [10] * (total // 10) + [total % 10] * (total % 10 > 0)
+    one, _ = run(Timebase(nominal), sizes, true)
+    other, _ = run(Timebase(nominal), by_ten, true)
+    assert one == other
+
+
+def test_lists_and_arrays_give_the_same_bits():
+    live, _ = run(Timebase(100), [10] * 300, 101.3)
+    whole, _ = run(Timebase(100), [50] * 60, 101.3, array=True)
+    assert live == whole
+
+
+@pytest.mark.parametrize("ppm", [-200, 0, 200])
+def test_eight_hours_of_drift_stay_within_three_milliseconds(ppm):
+    true_hz, n = 50 * (1 + ppm * 1e-6), 84
+    timebase, worst = Timebase(50), 0.0
+    for index in range(0, 8 * 3600 * 50, n):
+        timebase.feed(block(index, n, true_hz, array=True))
+        worst = max(worst, abs(timebase.now_s - (index + n - 1) / true_hz))
+    assert worst < 3e-3
+    assert timebase.measured_rate_hz == pytest.approx(true_hz, rel=20e-6)
+
+
+def test_a_rate_far_from_nominal_is_found_within_seconds():
+    timebase = Timebase(50)
+    run(timebase, [10] * 300, 52)
+    assert timebase.measured_rate_hz == pytest.approx(52, rel=1e-3)
+    assert timebase.now_s == pytest.approx(2999 / 52, abs=5e-3)
+
+
+def test_a_short_hole_is_interpolated_and_told():
+    grid, gaps = run(Timebase(50), [10] * 20, 50, skip={100, 110})
+    (gap,) = gaps
+    assert (gap.index, gap.samples, gap.filled) == (100, 20, True)
+    assert (gap.from_s, gap.to_s) == (99 / 50, 120 / 50)
+    assert sorted(grid) == list(range(200))
+    middle = value(99) + (value(120) - value(99)) * 11 / 21
+    assert grid[110] == pytest.approx(middle)
+
+
+def test_a_long_hole_breaks_the_grid():
+    lost = set(range(100, 140, 10))
+    grid, gaps = run(Timebase(50), [10] * 30, 50, skip=lost)
+    assert [gap.filled for gap in gaps] == [False]
+    assert sorted(grid) == [*range(100), *range(140, 300)]
+    assert all(grid[k] == value(k) for k in grid)
+
+
+def test_the_limit_of_filling_is_what_it_says():
+    n = int(FILL_S * 50)
+    for hole, filled in ((n, True), (n + 1, False)):
+        timebase = Timebase(50)
+        timebase.feed(block(0, 10, 50))
+        _, gap = timebase.feed(block(10 + hole, 10, 50))
+        assert gap.filled is filled
+
+
+def test_after_a_long_hole_the_ticks_say_where_it_goes_on():
+    true_hz = 51.0
+    timebase = Timebase(50)
+    run(timebase, [10] * 100, true_hz)
+    timebase.feed(block(180_000, 10, true_hz))
+    assert timebase.now_s == pytest.approx(180_009 / true_hz, abs=0.01)
+
+
+def test_joining_late_takes_the_high_bits_from_the_clock():
+    true_hz, index = 52.0, 1_000_064
+    timebase = Timebase(50)
+    timebase.set_clock(999_936, int(1024 * 999_936 / true_hz))
+    timebase.feed(block(index, 10, true_hz))
+    assert timebase.now_s == pytest.approx((index + 9) / true_hz, abs=0.5)
+
+
+def test_without_ticks_the_nominal_rate_holds():
+    grid, _ = run(Timebase(25), [10] * 10, 25, tick=False)
+    assert grid[40] == value(20)
+    assert grid[41] == pytest.approx((value(20) + value(21)) / 2)
+
+
+@given(cut=st.integers(0, 59), true=st.sampled_from([50.0, 50.7, 47.0]))
+def test_snapshot_and_restore_at_any_packet(cut, true):
+    whole, _ = run(Timebase(50), [13] * 60, true)
+    timebase = Timebase(50)
+    first, _ = run(timebase, [13] * cut, true)
+    resumed = Timebase.restored(json.loads(json.dumps(timebase.snapshot())))
+    second, _ = run(resumed, [13] * (60 - cut), true, start=13 * cut)
+    assert {**first, **second} == whole
+
+
+def test_all_sensors_share_one_grid():
+    column = [float(i) for i in range(10)]
+    columns = (column, column, column)
+    raw = RawBlock(boot=1, index=0, tick=0, acc_g=columns, gyro_rad_s=columns, mag_ut=columns)
+    samples, _ = Timebase(25).feed(raw)
+    assert samples.acc_g == samples.gyro_rad_s == samples.mag_ut
+    assert len(samples) == 19

@@ -1,0 +1,179 @@
+"""The Tracker: a pure fold over packets. Bad, repeated, late and absent ones are counted, and none stops it."""
+
+import json
+
+import pytest
+from fakes import MetronomeCounter, data_packet, data_packets, described
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.samples import Counting, Described, Gap, Packet, Rebooted, Signal, StepCounted
+from service.tracking.tracker import Tracker
+from service.wearables import bracelet as wire
+
+
+def make():
+    return Tracker(wire.Bracelet(), {"metronome": MetronomeCounter}, primary="metronome")
+
+
+def ready(**said):
+    tracker = make()
+    for packet in described(**said):
+        tracker.apply(packet)
+    return tracker
+
+
+def run(tracker, packets):
+    return [event for packet in packets for event in tracker.apply(packet)]
+
+
+def steps(events):
+    return [(event.boot, event.step.at_s, event.steps) for event in events if isinstance(event, StepCounted)]
+
+
+def only(events, kind):
+    return [event for event in events if isinstance(event, kind)]
+
+
+def test_steps_come_with_time_and_count():
+    tracker = ready()
+    events = run(tracker, data_packets([10] * 10))
+    assert steps(events) == [(1, 0.0, 1), (1, 0.5, 2), (1, 1.0, 3), (1, 1.5, 4)]
+    assert tracker.steps == {"metronome": 4}
+    assert tracker.tally.samples == 100
+
+
+def test_counts_and_signal_come_with_every_packet():
+    *_, signal, counting = run(ready(), data_packets([10] * 2))
+    assert isinstance(signal, Signal)
+    assert list(signal.values) == [i / 4096 for i in range(10, 20)]
+    assert (counting.steps, counting.steps_now, counting.now_s) == (1, 2, 19 / 50)
+
+
+@given(sizes=st.lists(st.integers(1, 84), min_size=1, max_size=40))
+def test_packet_size_changes_nothing(sizes):
+    total = sum(sizes)
+    whole = ready()
+    cut = ready()
+    assert steps(run(whole, data_packets([1] * total))) == steps(run(cut, data_packets(sizes)))
+    assert whole.tally.samples == cut.tally.samples == total
+
+
+def test_repeated_and_overlapping_packets_count_once():
+    tracker, plain = ready(), ready()
+    events = run(tracker, [data_packet(0), data_packet(0), data_packet(5, 20), data_packet(10), data_packet(25)])
+    assert steps(events) == steps(run(plain, data_packets([35])))
+    assert tracker.tally.packets_duplicate == 2
+    assert tracker.tally.samples == 35
+
+
+@given(cut=st.integers(1, 19), n=st.integers(1, 84))
+def test_an_overlap_across_a_tick_keeps_the_grid(cut, n):
+    """A packet cut in front of a stretch's first sample must not bring that stretch another's tick."""
+    whole, overlapping = ready(rate_hz=100.0), ready(rate_hz=100.0)
+    run(whole, data_packets([20] * 20, rate_hz=100.0))
+    run(overlapping, [data_packet(i, 20, rate_hz=100.0) for i in range(0, 120, 20)])
+    run(overlapping, [data_packet(120 - cut, n, rate_hz=100.0)])
+    run(overlapping, [data_packet(i, 20, rate_hz=100.0) for i in range(120, 400, 20)])
+    assert overlapping.now_s == whole.now_s
+    assert overlapping.steps == whole.steps
+
+
+def test_late_packets_are_dropped_and_told():
+    tracker = ready()
+    events = run(tracker, [data_packet(0), data_packet(20), data_packet(10), data_packet(30)])
+    assert only(events, Gap) == [Gap(from_s=0.18, to_s=0.4, index=10, samples=10, filled=True)]
+    assert tracker.tally.packets_duplicate == 1
+    assert tracker.tally.samples_lost == 10
+
+
+def test_a_long_gap_is_told_and_skipped():
+    tracker = ready()
+    events = run(tracker, [*data_packets([10] * 10), *data_packets([10] * 10, start=200)])
+    assert only(events, Gap) == [Gap(from_s=99 / 50, to_s=4.0, index=100, samples=100, filled=False)]
+    assert all(not 99 / 50 < at_s < 4.0 for _, at_s, _ in steps(events))
+    assert tracker.tally.gaps == 1
+
+
+@pytest.mark.parametrize("data", [b"", b"\x01\x01garbage", bytes.fromhex("0e 01 00000000 0000 000000000000")])
+def test_a_corrupt_packet_is_counted_and_skipped(data):
+    tracker, plain = ready(), ready()
+    run(tracker, data_packets([10] * 5))
+    assert tracker.apply(Packet(characteristic=wire.DATA, data=data, at_ns=0)) == []
+    run(tracker, data_packets([10] * 5, start=50))
+    run(plain, data_packets([10] * 10))
+    assert tracker.tally.packets_bad == 1
+    assert tracker.last_fault is not None
+    assert tracker.steps == plain.steps
+
+
+@pytest.mark.parametrize(("index", "boot"), [(2**30, 1), (50, 77)])
+def test_one_packet_that_claims_a_far_jump_or_a_reboot_is_not_believed(index, boot):
+    tracker = ready()
+    events = run(tracker, [*data_packets([10] * 5), data_packet(index, boot=boot), *data_packets([10] * 5, start=50)])
+    assert only(events, Gap) == only(events, Rebooted) == []
+    assert tracker.tally.packets_bad == 1
+    assert tracker.tally.samples == 100
+
+
+def test_two_that_agree_are_believed():
+    tracker = ready()
+    events = run(tracker, [*data_packets([10] * 5), *data_packets([10] * 5, start=2**30)])
+    assert [gap.samples for gap in only(events, Gap)] == [2**30 - 50]
+    assert tracker.tally.samples == 100
+    assert tracker.tally.packets_bad == 0
+
+
+def test_a_reboot_begins_device_time_anew_and_the_count_goes_on():
+    tracker = ready()
+    events = run(tracker, [*data_packets([10] * 5), *data_packets([10] * 5, boot=2)])
+    assert only(events, Rebooted) == [Rebooted(boot=2, previous=1)]
+    assert only(events, Gap) == []
+    assert steps(events) == [(1, 0.0, 1), (1, 0.5, 2), (2, 0.0, 3), (2, 0.5, 4)]
+    assert tracker.tally.reboots == 1
+
+
+def test_a_reboot_told_on_reconnecting_is_believed_at_once():
+    tracker = ready()
+    run(tracker, data_packets([10] * 5))
+    run(tracker, described(boot=2))
+    events = tracker.apply(data_packet(0, boot=2))
+    assert isinstance(events[0], Rebooted)
+    assert len(only(events, Counting)) == 1
+
+
+def test_the_index_wraps_without_a_gap():
+    start = 2**32 - 64
+    tracker = ready(clock=(2**32 - 128, 0))
+    events = run(tracker, data_packets([16] * 10, start=start))
+    assert only(events, Gap) == []
+    assert tracker.tally.samples == 160
+    assert tracker.tally.packets_duplicate == 0
+
+
+def test_samples_before_the_rate_are_bad_packets():
+    tracker = make()
+    scale = next(packet for packet in described() if packet.characteristic == wire.SCALE)
+    run(tracker, [scale, data_packet(0)])
+    assert tracker.tally.packets_bad == 1
+    assert "rate" in str(tracker.last_fault)
+
+
+def test_a_device_is_described_once_a_change():
+    tracker = make()
+    events = run(tracker, [*described(), *described()])
+    assert all(isinstance(event, Described) for event in events)
+    assert len(events) == 5
+    assert tracker.info.device == "dev-1"
+
+
+@given(cut=st.integers(0, 20))
+def test_snapshot_and_restore_at_any_packet(cut):
+    packets = [*data_packets([10] * 8), *data_packets([10] * 4, start=200), *data_packets([10] * 8, boot=2)]
+    whole, first, second = ready(), ready(), make()
+    expected = run(whole, packets)
+    before = run(first, packets[:cut])
+    second.restore(json.loads(json.dumps(first.snapshot())))
+    after = run(second, packets[cut:])
+    assert steps(before + after) == steps(expected)
+    assert second.snapshot() == whole.snapshot()
