@@ -1,0 +1,291 @@
+"""The adaptive double threshold as scalar kernels over one flat state: plain while live, compiled for recordings.
+
+`begin` opens a stretch of samples, `scan` eats them, `end` decides what is left; `double_threshold` says what they
+compute and why. The state `s` holds floats only: first the constants of an instance (`Y_WEIGHT` … `REFRESH`), then what
+changes. Samples are named by their grid index. Events are rows of `ROW` floats written to `out` after its first n
+entries: `(BAND, from, to, T_H, T_L, 0, 0)` for a closed window, `(STEP, index, spacing or 0, peak, valley, T_H, T_L)`.
+Only what numba and Python compute to the same bits is used: `+ − × ÷`, comparisons and `sqrt`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import MutableSequence, Sequence
+from math import sqrt
+from typing import Final
+
+# Constants of an instance.
+Y_WEIGHT: Final = 0  # 1 for the norm, 0 for √(X²+Z²)
+HALF: Final = 1  # N of (7), (8)
+VALLEYS: Final = 2  # how many valleys a peak may look at
+WAIT: Final = 3  # how many samples it waits for them
+REST: Final = 4  # g; less between peak and valley is rest
+LOWER_SHARE: Final = 5  # T_L = L + this share of H − L
+MIN_SPACING: Final = 6
+MAX_SPACING: Final = 7
+BOUT: Final = 8  # valid peaks that make a bout certain
+CREDIT: Final = 9  # 1: the peaks before it was certain count too
+LIMIT: Final = 10  # window length above which it is halved
+REFRESH: Final = 11  # moving samples after which the window length is taken anew; 0 never
+CAPACITY: Final = 12  # of the queue of undecided peaks
+CONSTANTS: Final = 13
+
+# Belief: it outlasts a gap.
+WINDOW: Final = 13  # window length in samples
+HIGH: Final = 14  # H
+LOW: Final = 15  # L
+HIGH_KNOWN: Final = 16
+LOW_KNOWN: Final = 17
+SPACING_SUM: Final = 18  # of the moving samples since the length was taken
+SPACINGS: Final = 19
+
+# The bout: once certain it outlasts a short gap.
+BOUT_PEAKS: Final = 20  # valid peaks so far
+LAST: Final = 21  # index of the last one
+
+# The stretch: it ends with a gap.
+FIRST: Final = 22  # index of its first sample
+NEXT: Final = 23  # index of the sample to come; −1 before the first stretch and after the last
+M1: Final = 24  # the four magnitudes before
+M2: Final = 25
+M3: Final = 26
+M4: Final = 27
+FILTERED: Final = 28  # X(n − 1)
+RUN: Final = 29  # > 0 rises, < 0 falls in a row up to now
+RUN_BEFORE: Final = 30  # length of the opposite run before
+TURN: Final = 31  # the value between both
+WINDOW_FROM: Final = 32
+CLOSE_AT: Final = 33
+PEAK_SUM: Final = 34
+PEAKS: Final = 35
+VALLEY_SUM: Final = 36
+VALLEYS_SEEN: Final = 37
+HEAD: Final = 38
+COUNT: Final = 39
+
+HELD: Final = 40
+"""Rows of `HELD_MAX` valid peaks of a bout that is not certain yet."""
+
+ROW: Final = 7
+BAND: Final = 0.0
+STEP: Final = 1.0
+HELD_MAX: Final = 12
+QUEUE: Final = HELD + HELD_MAX * ROW
+"""A ring of undecided peaks, `ENTRY` floats each."""
+
+AT: Final = 0
+PEAK: Final = 1
+SEEN: Final = 2  # valleys after it
+VALLEY: Final = 3  # the lowest of them
+CLOSED: Final = 4  # 1 once its window's thresholds are known
+UPPER: Final = 5
+LOWER: Final = 6
+ENTRY: Final = 7
+
+WARM_UP: Final = 5
+"""First samples of a stretch in which no extremum counts: the mean (5) is not full yet."""
+
+BRIDGE: Final = 150.0
+"""A bout goes on over a gap if the two steps around it lie less than 3 s apart."""
+
+Floats = Sequence[float]
+State = MutableSequence[float]
+
+
+def begin(s: State, index: int, magnitude: float) -> None:
+    """Open a stretch at grid index `index`, whose magnitude stands for those before it; only a certain bout goes on."""
+    if s[BOUT_PEAKS] < s[BOUT]:
+        s[BOUT_PEAKS] = 0.0
+    for name in (RUN, RUN_BEFORE, TURN, PEAK_SUM, PEAKS, VALLEY_SUM, VALLEYS_SEEN, HEAD, COUNT):
+        s[name] = 0.0
+    s[M1] = s[M2] = s[M3] = s[M4] = magnitude
+    s[FILTERED] = (magnitude + magnitude + magnitude + magnitude + magnitude) / 5.0
+    s[FIRST] = s[NEXT] = s[WINDOW_FROM] = float(index)
+    s[CLOSE_AT] = s[WINDOW_FROM] + s[WINDOW] - 1.0 + s[HALF]
+
+
+def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
+    """Eat n samples (g); write X(n) to `out[:n]` and rows after it; return where the rows end."""
+    y_weight, half = s[Y_WEIGHT], s[HALF]
+    m1, m2, m3, m4 = s[M1], s[M2], s[M3], s[M4]
+    last, run, run_before, turn = s[FILTERED], s[RUN], s[RUN_BEFORE], s[TURN]
+    k, close_at, end_of_rows = s[NEXT], s[CLOSE_AT], n
+    for i in range(n):
+        a, b, c = x[i], y[i], z[i]
+        m = sqrt(a * a + y_weight * (b * b) + c * c)
+        filtered = (m + m1 + m2 + m3 + m4) / 5.0
+        m1, m2, m3, m4 = m, m1, m2, m3
+        out[i] = filtered
+        if filtered > last:
+            if run > 0.0:
+                run += 1.0
+            else:
+                run_before, run, turn = -run, 1.0, last
+            if run == half and run_before >= half:
+                end_of_rows = _valley(s, k - half, turn, out, end_of_rows)
+        elif filtered < last:
+            if run < 0.0:
+                run -= 1.0
+            else:
+                run_before, run, turn = run, -1.0, last
+            if run == -half and run_before >= half:
+                _peak(s, k - half, turn)
+        else:
+            run = 0.0
+        last = filtered
+        if k == close_at:
+            end_of_rows = _close(s, k - half, out, end_of_rows)
+            close_at = s[CLOSE_AT]
+        k += 1.0
+    s[M1], s[M2], s[M3], s[M4] = m1, m2, m3, m4
+    s[FILTERED], s[RUN], s[RUN_BEFORE], s[TURN] = last, run, run_before, turn
+    s[NEXT] = k
+    return end_of_rows
+
+
+def end(s: State, out: State) -> int:
+    """End the stretch: decide every peak with what is there, write rows to `out[0:]`, return where they end."""
+    rows = 0
+    if s[NEXT] > s[WINDOW_FROM]:
+        rows = _close(s, s[NEXT] - 1.0, out, rows)
+    rows = _settle(s, s[NEXT] + s[WAIT] + 1.0, out, rows)
+    s[COUNT] = 0.0
+    return rows
+
+
+def pending(s: State) -> int:
+    """Return how many peaks are likely to become steps: the bout's held ones, and undecided ones above T_H."""
+    likely = 0
+    if s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT]:
+        likely = int(s[BOUT_PEAKS])
+    if s[HIGH_KNOWN] == 0.0 or s[LOW_KNOWN] == 0.0:
+        return likely
+    upper = (s[HIGH] + s[LOW]) / 2.0
+    head, capacity = int(s[HEAD]), int(s[CAPACITY])
+    for i in range(int(s[COUNT])):
+        peak = s[QUEUE + (head + i) % capacity * ENTRY + PEAK]
+        if peak > upper and peak - s[LOW] >= s[REST]:
+            likely += 1
+    return likely
+
+
+def _peak(s: State, at: float, value: float) -> None:
+    """Add a peak to the window's mean and to the queue."""
+    if at < s[FIRST] + WARM_UP:
+        return
+    s[PEAK_SUM] += value
+    s[PEAKS] += 1.0
+    q = QUEUE + int(s[HEAD] + s[COUNT]) % int(s[CAPACITY]) * ENTRY
+    s[q + AT], s[q + PEAK] = at, value
+    s[q + SEEN] = s[q + VALLEY] = s[q + CLOSED] = s[q + UPPER] = s[q + LOWER] = 0.0
+    s[COUNT] += 1.0
+
+
+def _valley(s: State, at: float, value: float, out: State, rows: int) -> int:
+    """Add a valley to the window's mean and show it to the peaks that wait for one."""
+    if at < s[FIRST] + WARM_UP:
+        return rows
+    s[VALLEY_SUM] += value
+    s[VALLEYS_SEEN] += 1.0
+    head, capacity = int(s[HEAD]), int(s[CAPACITY])
+    for i in range(int(s[COUNT])):
+        q = QUEUE + (head + i) % capacity * ENTRY
+        if s[q + SEEN] < s[VALLEYS] and at - s[q + AT] <= s[WAIT]:
+            if s[q + SEEN] == 0.0 or value < s[q + VALLEY]:
+                s[q + VALLEY] = value
+            s[q + SEEN] += 1.0
+    return _settle(s, at, out, rows)
+
+
+def _close(s: State, to: float, out: State, rows: int) -> int:
+    """Close the window that ends with sample `to`: its thresholds (9)–(16), then its peaks."""
+    if s[PEAKS] > 0.0:
+        s[HIGH] = _mean(s[PEAK_SUM], s[PEAKS], s[HIGH], s[HIGH_KNOWN])
+        s[HIGH_KNOWN] = 1.0
+    if s[VALLEYS_SEEN] > 0.0:
+        s[LOW] = _mean(s[VALLEY_SUM], s[VALLEYS_SEEN], s[LOW], s[LOW_KNOWN])
+        s[LOW_KNOWN] = 1.0
+    s[PEAK_SUM] = s[PEAKS] = s[VALLEY_SUM] = s[VALLEYS_SEEN] = 0.0
+    upper = (s[HIGH] + s[LOW]) / 2.0
+    lower = s[LOW] + s[LOWER_SHARE] * (s[HIGH] - s[LOW])
+    known = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    if known:
+        rows = _row(out, rows, BAND, s[WINDOW_FROM], to, upper, lower, 0.0, 0.0)
+    head, capacity = int(s[HEAD]), int(s[CAPACITY])
+    for i in range(int(s[COUNT])):
+        q = QUEUE + (head + i) % capacity * ENTRY
+        if s[q + CLOSED] == 0.0:
+            s[q + CLOSED] = 1.0
+            s[q + UPPER] = upper if known else s[q + PEAK]
+            s[q + LOWER] = lower
+    s[WINDOW_FROM] = to + 1.0
+    s[CLOSE_AT] = to + s[WINDOW] + s[HALF]
+    return _settle(s, to, out, rows)
+
+
+def _mean(total: float, count: float, before: float, known: float) -> float:
+    """(11)–(14): the mean of several extrema; a single one is averaged with the window before's mean."""
+    if count == 1.0 and known > 0.0:
+        return (before + total) / 2.0
+    return total / count
+
+
+def _settle(s: State, now: float, out: State, rows: int) -> int:
+    """Decide the oldest peaks, in order, as far as their thresholds and valleys are known at sample `now`."""
+    head, count, capacity = int(s[HEAD]), int(s[COUNT]), int(s[CAPACITY])
+    while count > 0:
+        q = QUEUE + head * ENTRY
+        if s[q + CLOSED] == 0.0:
+            break
+        if s[q + PEAK] > s[q + UPPER]:
+            if s[q + SEEN] > 0.0 and s[q + VALLEY] < s[q + LOWER]:
+                rows = _valid(s, q, out, rows)
+            elif s[q + SEEN] < s[VALLEYS] and now - s[q + AT] <= s[WAIT]:
+                break
+        head = (head + 1) % capacity
+        count -= 1
+    s[HEAD], s[COUNT] = float(head), float(count)
+    return rows
+
+
+def _valid(s: State, q: int, out: State, rows: int) -> int:
+    """Sort false steps out (17) and write the peak at queue place `q` as a step, once its bout is certain."""
+    at, known = s[q + AT], s[BOUT_PEAKS] > 0.0
+    spacing = at - s[LAST]
+    if s[q + PEAK] - s[q + VALLEY] < s[REST] or (known and spacing <= s[MIN_SPACING]):
+        return rows
+    over_gap = s[LAST] < s[FIRST]
+    if not known or spacing >= (BRIDGE if over_gap else s[MAX_SPACING]):
+        s[BOUT_PEAKS] = spacing = 0.0
+    elif over_gap:
+        spacing = 0.0  # how many steps the gap hides is unknown
+    else:
+        _learn(s, spacing)
+    s[LAST] = at
+    s[BOUT_PEAKS] += 1.0
+    if s[BOUT_PEAKS] > s[BOUT]:
+        return _row(out, rows, STEP, at, spacing, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
+    last = HELD + (int(s[BOUT_PEAKS]) - 1) * ROW
+    _row(s, last, STEP, at, spacing, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
+    if s[BOUT_PEAKS] == s[BOUT]:
+        for i in range(HELD if s[CREDIT] > 0.0 else last, last + ROW):
+            out[rows] = s[i]
+            rows += 1
+    return rows
+
+
+def _learn(s: State, spacing: float) -> None:
+    """Take the window length (6) anew after enough moving samples."""
+    s[SPACING_SUM] += spacing
+    s[SPACINGS] += 1.0
+    if s[REFRESH] > 0.0 and s[SPACING_SUM] >= s[REFRESH]:
+        length = s[SPACING_SUM] / s[SPACINGS]
+        if length > s[LIMIT]:
+            length /= 2.0
+        s[WINDOW] = float(int(length + 0.5))
+        s[SPACING_SUM] = s[SPACINGS] = 0.0
+
+
+def _row(out: State, rows: int, kind: float, a: float, b: float, c: float, d: float, e: float, f: float) -> int:
+    out[rows], out[rows + 1], out[rows + 2], out[rows + 3] = kind, a, b, c
+    out[rows + 4], out[rows + 5], out[rows + 6] = d, e, f
+    return rows + ROW

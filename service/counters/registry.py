@@ -1,0 +1,82 @@
+"""Every counter by name: its parameters, presets, the sensors it needs and how it is built.
+
+A new counter is its own file and one line in `_KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+from service.counters import double_threshold
+from service.counters.contract import StepCounter, with_overrides
+from service.errors import CounterError
+from service.samples import Sensor
+
+DEFAULT: Final = "double_threshold"
+"""The counter that runs where none is asked for."""
+
+ACCELEROMETER: Final = frozenset({Sensor.ACCELEROMETER})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CounterKind:
+    """One algorithm: `presets` holds its parameter sets `paper` and `tuned`, `build` makes a counter of one."""
+
+    name: str
+    params: type
+    presets: Mapping[str, Any]
+    sensors: frozenset[Sensor]
+    build: Callable[[Any], StepCounter]
+
+
+def _kind(
+    name: str, build: Callable[[Any], StepCounter], *, paper: object, tuned: object, sensors: frozenset[Sensor]
+) -> CounterKind:
+    presets = MappingProxyType({"paper": paper, "tuned": tuned})
+    return CounterKind(name=name, params=type(paper), presets=presets, sensors=sensors, build=build)
+
+
+_KINDS: Final = (
+    _kind(
+        "double_threshold",
+        double_threshold.DoubleThreshold,
+        paper=double_threshold.PAPER,
+        tuned=double_threshold.TUNED,
+        sensors=ACCELEROMETER,
+    ),
+)
+
+COUNTERS: Final[Mapping[str, CounterKind]] = MappingProxyType({kind.name: kind for kind in _KINDS})
+
+
+def kind(name: str) -> CounterKind:
+    """Return the counter of that name; CounterError lists the known ones."""
+    if name not in COUNTERS:
+        raise CounterError(f"no counter {name!r}; there are {', '.join(COUNTERS)}")
+    return COUNTERS[name]
+
+
+def parameters(name: str, preset: str = "tuned", overrides: Mapping[str, object] | None = None) -> Any:  # noqa: ANN401
+    """Return a preset's parameters with `overrides`, each checked; CounterError, or ParameterError for an override."""
+    presets = kind(name).presets
+    if preset not in presets:
+        raise CounterError(f"{name} has no preset {preset!r}; there are {', '.join(presets)}")
+    return with_overrides(presets[preset], overrides or {})
+
+
+def make(
+    name: str,
+    preset: str = "tuned",
+    overrides: Mapping[str, object] | None = None,
+    sensors: Collection[Sensor] | None = None,
+) -> StepCounter:
+    """Build a counter; where `sensors` says what the device has, CounterError names those that are missing."""
+    chosen = kind(name)
+    lacking = [] if sensors is None else sorted(chosen.sensors - frozenset(sensors))
+    if lacking:
+        has = ", ".join(sorted(sensors or ())) or "none"
+        raise CounterError(f"{name} needs {', '.join(lacking)}; the device has {has}")
+    return chosen.build(parameters(name, preset, overrides))
