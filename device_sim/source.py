@@ -12,10 +12,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from device_sim.gait import Walker
 from service.errors import ParameterError
 from service.recordings import Recording
 
+__all__ = ["RecordingSource", "Samples", "Source", "WalkerSource"]
+
 Samples = NDArray[np.float64]
+
+WalkerSource = Walker
+"""A walker is a source as it stands; the name says so where both kinds are chosen from."""
 
 
 class Source(Protocol):

@@ -1,0 +1,276 @@
+"""What the synthetic walker's wearer does: one measured row an activity.
+
+Measured by us on the recordings' development split, in windows of 4 s: least squares of the acceleration's norm at
+½, 1, 1½, 2, 3 and 4 times the step rate (N½…N4), of its vector at half the step rate (V½), medians over windows. A
+row's `vertical_g`, `asymmetry`, `swing_deg` and `arm_deg` are what makes a walker of 0.6 m arm length show those
+medians; they are the model's numbers, not anatomy. Phases of a walk's vertical harmonics are those of
+oxford_opt's step-locked mean (4 neck pouch, 2 armband recordings; switches in the shoes give the steps).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+WALK_LAG_RAD: Final = (0.0, 0.65 * math.pi, 0.31 * math.pi, 0.28 * math.pi)
+"""Phases of cosines at 1…4 times the step rate; the first is at its height at the step."""
+
+ARM_M: Final = 0.6
+"""Shoulder to wrist, ours. With it the normal row swings 18° as eth2023's gyroscope has it (18…21°); the run row 26°,
+where the gyroscope of eth2022 and 2023 says 38…42°, elbow included."""
+
+SENSOR_NOISE_G: Final = 0.003
+"""White, per axis: the quietest 2 s of the eth2023 recordings have 0.0017…0.0067."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gait:
+    """How somebody steps: `vertical_g` at 1…4 times the step rate, standard deviations as fractions of the mean.
+
+    `asymmetry` is how much stronger than the mean one foot lands, `arm_deg` the forearm's mean angle to the vertical,
+    `swing_deg` its swing to either side, `rough_g` the white remainder above 10 Hz. At
+    a step the arm is at its foremost or hindmost, where `swing_lag_rad` is 0. `measured` says where it is from.
+    """
+
+    cadence_spm: float
+    interval_sd: float
+    strength_sd: float
+    asymmetry: float
+    vertical_g: tuple[float, float, float, float]
+    swing_deg: float
+    arm_deg: float
+    rough_g: float
+    swing_lag_rad: float = 0.0
+    vertical_lag_rad: tuple[float, float, float, float] = WALK_LAG_RAD
+    measured: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """What an arm does without a step: it turns, heaves, shakes, knocks.
+
+    Every `turn_every_s` (once where it is infinite) it turns by `turn_deg` within `turn_s` and later back, heaving by
+    `heave_g` (up first; negative: down first). It shakes with `shake_g` at `shake_hz`, along a line
+    `shake_up_deg` above the horizontal, and knocks three times a second.
+    """
+
+    turn_deg: float = 0.0
+    turn_s: float = 1.0
+    turn_every_s: float = math.inf
+    heave_g: float = 0.0
+    shake_hz: float = 1.0
+    shake_g: float = 0.0
+    shake_up_deg: float = 0.0
+    knock_g: float = 0.0
+    rough_g: float = 0.0
+    measured: str
+
+
+GAITS: Final[dict[str, Gait]] = {
+    "slow": Gait(
+        cadence_spm=90,
+        interval_sd=0.057,
+        strength_sd=0.11,
+        asymmetry=0.25,
+        vertical_g=(0.243, 0.075, 0.059, 0.045),
+        swing_deg=18.4,
+        arm_deg=9.3,
+        rough_g=0.017,
+        measured=(
+            "pebble_wrist, 86 windows at 79…95/min: N½ .042 N1 .138 N1½ .028 N2 .067 N3 .047 N4 .030 V½ .08; "
+            "intervals of walk_30, walk_30_slow; strength as normal"
+        ),
+    ),
+    "normal": Gait(
+        cadence_spm=108,
+        interval_sd=0.041,
+        strength_sd=0.11,
+        asymmetry=0.25,
+        vertical_g=(0.474, 0.124, 0.091, 0.089),
+        swing_deg=18.3,
+        arm_deg=12.9,
+        rough_g=0.019,
+        measured=(
+            "pebble_wrist, 1313 windows at 100…115/min: N½ .083 N1 .333 N1½ .083 N2 .112 N3 .073 N4 .066 V½ "
+            ".22; intervals, strength, roughness of eth2023 01, 02, 04 (intervals .041; oxford_opt without "
+            "switch jitter .043)"
+        ),
+    ),
+    "fast": Gait(
+        cadence_spm=118,
+        interval_sd=0.041,
+        strength_sd=0.11,
+        asymmetry=0.25,
+        vertical_g=(0.492, 0.163, 0.053, 0.075),
+        swing_deg=18.0,
+        arm_deg=19.2,
+        rough_g=0.03,
+        measured=(
+            "pebble_wrist, 23 windows at 116…124/min: N½ .168 N1 .340 N1½ .089 N2 .143 N3 .041 N4 .053 V½ .35; "
+            "variations as normal, roughness between normal and stairs (ours)"
+        ),
+    ),
+    "run": Gait(
+        cadence_spm=163,
+        interval_sd=0.012,
+        strength_sd=0.1,
+        asymmetry=0.108,
+        vertical_g=(2.253, 1.077, 0.099, 0.001),
+        swing_deg=26.2,
+        arm_deg=2.8,
+        rough_g=0.16,
+        swing_lag_rad=2.21,
+        vertical_lag_rad=(0.0, -0.15, 0.41, 1.39),
+        measured=(
+            "pebble_wrist/running_100 (eth clips at 2 g): N½ .144 N1 1.352 N1½ .119 N2 1.076 N3 .152 N4 .072 V½ "
+            "1.85, sd 1.32, mean 2.35, peaks 4.46 g, all fitted with the phases; roughness of eth2022 jog"
+        ),
+    ),
+    "stairs_up": Gait(
+        cadence_spm=133,
+        interval_sd=0.057,
+        strength_sd=0.2,
+        asymmetry=0.25,
+        vertical_g=(0.634, 0.082, 0.056, 0.05),
+        swing_deg=9.3,
+        arm_deg=21.7,
+        rough_g=0.057,
+        measured=(
+            "eth2022 walk_upstairs_hands-in-pockets: N½ .088 N1 .529 N1½ .080 N2 .074 N3 .038 N4 .019 V½ .24; "
+            "hands in pockets, so little swing; intervals slow's"
+        ),
+    ),
+    "stairs_down": Gait(
+        cadence_spm=131,
+        interval_sd=0.057,
+        strength_sd=0.2,
+        asymmetry=0.0,
+        vertical_g=(0.783, 0.056, 0.083, 0.112),
+        swing_deg=23.1,
+        arm_deg=20.3,
+        rough_g=0.072,
+        measured=(
+            "eth2022 walk_steps_down: N½ .357 N1 .465 N1½ .111 N2 .068 N3 .049 N4 .033 V½ .63; strength's "
+            "spread stairs_up's, intervals slow's"
+        ),
+    ),
+    "uphill": Gait(
+        cadence_spm=108,
+        interval_sd=0.05,
+        strength_sd=0.15,
+        asymmetry=0.25,
+        vertical_g=(0.554, 0.103, 0.074, 0.07),
+        swing_deg=13.8,
+        arm_deg=17.3,
+        rough_g=0.038,
+        measured=(
+            "nothing: no recording of a slope. Ours: half way from normal to stairs_up, at the cadence of normal"
+        ),
+    ),
+    "downhill": Gait(
+        cadence_spm=108,
+        interval_sd=0.05,
+        strength_sd=0.15,
+        asymmetry=0.125,
+        vertical_g=(0.629, 0.09, 0.087, 0.1),
+        swing_deg=20.7,
+        arm_deg=16.6,
+        rough_g=0.045,
+        measured=(
+            "nothing: no recording of a slope. Ours: half way from normal to stairs_down, at the cadence of normal"
+        ),
+    ),
+    "still_arm": Gait(
+        cadence_spm=108,
+        interval_sd=0.041,
+        strength_sd=0.11,
+        asymmetry=0.05,
+        vertical_g=(0.343, 0.055, 0.046, 0.026),
+        swing_deg=7.0,
+        arm_deg=6.4,
+        rough_g=0.023,
+        measured=(
+            "eth2023 labeled_01 (gyroscope: 5°): N½ .019 N1 .314 N1½ .013 N2 .053 N3 .042 N4 .019 V½ .09; "
+            "variations as normal"
+        ),
+    ),
+    "pocket": Gait(
+        cadence_spm=107,
+        interval_sd=0.041,
+        strength_sd=0.11,
+        asymmetry=0.25,
+        vertical_g=(0.454, 0.239, 0.093, 0.116),
+        swing_deg=19.2,
+        arm_deg=9.5,
+        rough_g=0.025,
+        measured=(
+            "pebble_wrist/walk_50_hands_in_pocket: N½ .055 N1 .303 N1½ .148 N2 .205 N3 .069 N4 .085 V½ .23; "
+            "variations as normal"
+        ),
+    ),
+}
+
+MOTIONS: Final[dict[str, Motion]] = {
+    "rest": Motion(
+        measured="negatives_banglejs/static, pebble_wrist/not_moving: norm's sd 0.003…0.006 g, the sensor's"
+    ),
+    "sit": Motion(
+        turn_deg=75,
+        turn_s=2.7,
+        heave_g=-0.28,
+        rough_g=0.02,
+        measured="negatives_hmp, 71 sitdown_chair: turn 75° in 2.7 s, norm 0.79…1.34 g (1st and 99th percentile)",
+    ),
+    "stand": Motion(
+        turn_deg=77,
+        turn_s=2.8,
+        heave_g=0.26,
+        rough_g=0.02,
+        measured="negatives_hmp, 70 standup_chair: turn 77° in 2.8 s, norm 0.75…1.28 g",
+    ),
+    "type": Motion(
+        turn_deg=14,
+        turn_s=1.0,
+        turn_every_s=10,
+        rough_g=0.016,
+        measured="negatives_banglejs/work57min: per 10 s a turn of 14° and norm's sd 0.016 g; 12.5 Hz hide single keys",
+    ),
+    "knock": Motion(
+        knock_g=1.0,
+        rough_g=0.01,
+        measured="nothing: no recording has it. Ours: 3 knocks a second, 1 g, ringing at 12 Hz for 30 ms, pauses",
+    ),
+    "gesture": Motion(
+        turn_deg=35,
+        turn_s=1.0,
+        turn_every_s=3,
+        heave_g=0.25,
+        rough_g=0.03,
+        measured="pebble_wrist/raise_arm: about 10 turns of 35° in 27 s, norm 0.62…1.35 g",
+    ),
+    "brush": Motion(
+        shake_hz=5.6,
+        shake_g=0.6,
+        shake_up_deg=50,
+        turn_deg=20,
+        turn_s=2,
+        turn_every_s=10,
+        rough_g=0.1,
+        measured="negatives_hmp, 10 brush_teeth: 4.0…6.4 Hz at 0.3…0.9 g, norm's sd 0.36 g",
+    ),
+    "wave": Motion(
+        shake_hz=0.8,
+        shake_g=0.6,
+        shake_up_deg=15,
+        rough_g=0.05,
+        measured="pebble_wrist/hand_movements_x: 0.8 Hz at 0.61 g, norm's sd 0.145 g: rhythm of a slow walk",
+    ),
+    "drive": Motion(
+        turn_deg=10,
+        turn_s=2,
+        turn_every_s=10,
+        rough_g=0.047,
+        measured="negatives_banglejs/drive29: per 10 s a turn of 10°, norm's sd 0.047 g",
+    ),
+}
