@@ -71,12 +71,15 @@ def read_csv(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recordin
 
 
 def write_csv(recording: Recording, path: str | Path) -> None:
-    """Write `recording` so that `read` gives back the same numbers, bit for bit; white space in texts is folded."""
+    """Write `recording` so that `read` gives back the same numbers, bit for bit.
+
+    In texts, white space and control characters become one blank.
+    """
     texts = {name: getattr(recording, name) for name in TEXTS}
     about: dict[str, object] = {"rate_hz": float(recording.rate_hz), "true_steps": recording.true_steps}
     if recording.step_t_s is not None:
         about["step_t_s"] = " ".join(map(repr, recording.step_t_s.tolist()))
-    about |= {name: " ".join(text.split()) for name, text in texts.items() if text is not None}
+    about |= {name: _folded(text) for name, text in texts.items() if text is not None}
     names, blocks = [TIME, *ACC], [recording.t_s[:, None], recording.acc_g]
     for triple, values in ((GYRO, recording.gyro_rad_s), (MAG, recording.mag_ut)):
         if values is not None:
@@ -86,6 +89,10 @@ def write_csv(recording: Recording, path: str | Path) -> None:
         file.writelines(f"# {key}: {value}\n" for key, value in about.items() if value is not None)
         file.write(",".join(names) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in np.hstack(blocks).tolist())
+
+
+def _folded(text: str) -> str:
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 def _split(path: Path) -> tuple[dict[str, str], list[str], int, list[str]]:

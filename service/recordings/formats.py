@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Protocol
 
-from service.errors import RecordingError
+import numpy as np
+
+from service.errors import ParameterError, RecordingError
 from service.recordings import csv_file, npz_file, paper_file
 from service.recordings.recording import Recording
 
@@ -53,22 +56,33 @@ def read(path: str | Path, *, lsb_per_g: float = paper_file.LSB_PER_G, rate_hz: 
     """Read a recording of any known format.
 
     `lsb_per_g` scales formats that hold a sensor's counts; `rate_hz` is the rate of a file that does not say its own.
-    RecordingError says what is wrong with the file, where in it, and what to do.
+    RecordingError says what is wrong with the file, where in it, and what to do; ParameterError refuses a rate or a
+    scale that is not above 0.
     """
+    for name, value in (("lsb_per_g", lsb_per_g), ("rate_hz", rate_hz)):
+        if value is not None and not 0 < value < math.inf:
+            raise ParameterError(name, value, "a finite number above 0 is wanted")
     path = Path(path)
     possible = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
     if not possible:
         known_ones = ", ".join(sorted(suffixes()))
         raise RecordingError(str(path), f"unknown ending {path.suffix!r}; known are {known_ones}")
     try:
-        with path.open("rb") as file:
-            head = file.read(HEAD_BYTES)
-        if not head.strip():
-            raise RecordingError(str(path), "the file is empty")
-        for known in possible:
-            if known.recognises(head):
-                return known.read(path, lsb_per_g=lsb_per_g, rate_hz=rate_hz)
+        known = _recognised(path, possible)
+        # Values that overflow are found by the checks, which say where they are.
+        with np.errstate(all="ignore"):
+            return known.read(path, lsb_per_g=lsb_per_g, rate_hz=rate_hz)
     except OSError as error:
         raise RecordingError(str(path), error.strerror or str(error)) from error
+
+
+def _recognised(path: Path, possible: Sequence[Format]) -> Format:
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    if not head.strip():
+        raise RecordingError(str(path), "the file is empty")
+    for known in possible:
+        if known.recognises(head):
+            return known
     expected = " or ".join(known.name for known in possible)
     raise RecordingError(str(path), f"the content is not what the ending {path.suffix!r} says ({expected})")

@@ -7,18 +7,22 @@ be there. Arrays of Python objects are refused: reading a recording never runs c
 from __future__ import annotations
 
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.errors import RecordingError
 from service.recordings.recording import Floats, Recording, median_rate_hz, merge_repeated_stamps
 
+Array = NDArray[Any]
+
 ZIP_MAGIC = b"PK"
-UNKNOWN_STEPS = -1
-"""What some archives hold where the number of steps was never counted."""
+_NUMERIC = "iuf"
+"""numpy's kinds of numbers: signed, unsigned, floating."""
 
 
 def recognises(head: bytes) -> bool:
@@ -31,7 +35,7 @@ def read_npz(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recordin
     arrays = _load(path)
     missing = [name for name in ("t", "acc") if name not in arrays]
     if missing:
-        found = ", ".join(sorted(arrays)) or "nothing"
+        found = ", ".join(sorted(arrays)) or "no array"
         raise RecordingError(str(path), f"no array {' and '.join(missing)}; it holds {found}")
     gyro_deg_s = _floats(path, arrays, "gyro")
     t_s, (acc_g, gyro_rad_s, mag_ut) = merge_repeated_stamps(
@@ -41,46 +45,58 @@ def read_npz(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recordin
         _floats(path, arrays, "mag"),
     )
     assert acc_g is not None  # noqa: S101  # it was given
-    steps = _scalar(arrays, "true_steps")
+    steps = _number(path, arrays, "true_steps")
     return Recording(
         path=path,
         t_s=t_s,
         acc_g=acc_g,
-        rate_hz=float(_scalar(arrays, "rate_hz") or rate_hz or median_rate_hz(t_s)),
+        rate_hz=_number(path, arrays, "rate_hz") or rate_hz or median_rate_hz(t_s),
         gyro_rad_s=gyro_rad_s,
         mag_ut=mag_ut,
         step_t_s=_floats(path, arrays, "step_t"),
-        true_steps=None if steps is None or steps == UNKNOWN_STEPS else int(steps),
-        placement=_scalar(arrays, "placement"),
-        activity=_scalar(arrays, "activity"),
-        subject=_scalar(arrays, "subject"),
-        quality=_scalar(arrays, "gt_quality"),
+        true_steps=None if steps is None else round(steps),
+        placement=_text(arrays, "placement"),
+        activity=_text(arrays, "activity"),
+        subject=_text(arrays, "subject"),
+        quality=_text(arrays, "gt_quality"),
     )
 
 
-def _load(path: Path) -> Mapping[str, Any]:
+def _load(path: Path) -> Mapping[str, Array]:
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (ValueError, zipfile.BadZipFile, EOFError, NotImplementedError, AttributeError) as error:
+        # numpy leaves a file open that it opened itself and could not read.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            members = {name: archive[name] for name in archive.files}
+    except (ValueError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise RecordingError(str(path), f"no numpy archive of plain arrays ({error})") from error
+    # A member that is no array comes as bytes.
+    return {name: member for name, member in members.items() if isinstance(member, np.ndarray)}
 
 
-def _required(path: Path, arrays: Mapping[str, Any], name: str) -> Floats:
+def _required(path: Path, arrays: Mapping[str, Array], name: str) -> Floats:
     values = _floats(path, arrays, name)
     assert values is not None  # noqa: S101  # the caller has checked
     return values
 
 
-def _floats(path: Path, arrays: Mapping[str, Any], name: str) -> Floats | None:
-    if name not in arrays:
+def _floats(path: Path, arrays: Mapping[str, Array], name: str) -> Floats | None:
+    array = arrays.get(name)
+    if array is None:
         return None
-    try:
-        return np.ascontiguousarray(arrays[name], dtype=np.float64)
-    except (ValueError, TypeError) as error:
-        raise RecordingError(str(path), f"array {name} does not hold numbers ({error})") from error
+    if array.dtype.kind not in _NUMERIC:
+        raise RecordingError(str(path), f"array {name} holds {array.dtype}, not numbers")
+    return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def _scalar(arrays: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401  # whatever the archive holds
-    value = arrays.get(name)
-    return None if value is None or value.shape != () else value.item()
+def _number(path: Path, arrays: Mapping[str, Array], name: str) -> float | None:
+    values = _floats(path, arrays, name)
+    if values is None:
+        return None
+    if values.size != 1 or not np.isfinite(values).all():
+        raise RecordingError(str(path), f"{name} is {values.tolist()}, not one finite number")
+    return float(values.reshape(()))
+
+
+def _text(arrays: Mapping[str, Array], name: str) -> str | None:
+    array = arrays.get(name)
+    return None if array is None or array.shape != () else str(array.item())

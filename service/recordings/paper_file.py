@@ -32,7 +32,7 @@ STAMP_SLACK: Final = 0.1
 _SEPARATOR: Final = re.compile(r"[,;\t ]+")
 _NUMBER: Final = r"[-+]?\d+(?:\.\d+)?"
 _ROW: Final = re.compile(
-    rf"(?P<index>\d+) (?P<x>{_NUMBER}) (?P<y>{_NUMBER}) (?P<z>{_NUMBER}) "
+    rf"(?P<index>\d{{1,18}}) (?P<x>{_NUMBER}) (?P<y>{_NUMBER}) (?P<z>{_NUMBER}) "
     r"(?P<year>\d{4})[/-](?P<month>\d{1,2})[/-](?P<day>\d{1,2}) "
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2})(?:[:.](?P<ms>\d{1,3}))?"
 )
@@ -42,14 +42,12 @@ _HEADER_LINES: Final = 2
 
 def recognises(head: bytes) -> bool:
     """Tell whether one of the first lines of `head` is a row of the table."""
-    lines = [line for line in head.decode("latin-1").splitlines() if line.strip()]
+    lines = [line for line in head.decode("latin-1").split("\n") if line.strip()]
     return any(_row(line) for line in lines[: _HEADER_LINES + 1])
 
 
 def read_paper(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recording:
     """Read the table; `lsb_per_g` counts are 1 g. RecordingError names the line that breaks it."""
-    if not lsb_per_g > 0:
-        raise RecordingError(str(path), f"a scale of {lsb_per_g} LSB per g; it must be above 0")
     rate_hz = rate_hz or RATE_HZ
     rows = _rows(path)
     index = np.array([int(row["index"]) for row in rows], dtype=np.int64)
@@ -69,13 +67,15 @@ def _row(line: str) -> re.Match[str] | None:
 
 def _rows(path: Path) -> list[re.Match[str]]:
     rows: list[re.Match[str]] = []
-    for number, line in enumerate(_text(path).splitlines(), start=1):
+    for number, line in enumerate(_text(path).split("\n"), start=1):
         row = _row(line)
         if row is not None:
             rows.append(row)
         elif rows and line.strip():
             wanted = "index, X, Y, Z, date, time are wanted, as in 58,-22,-5,16,2017/1/3,21:47:38:314"
             raise RecordingError(str(path), f"line {number}: {line.strip()[:60]!r}; {wanted}")
+    if not rows:
+        raise RecordingError(str(path), "no row of the paper's table; save the file as UTF-8")
     return rows
 
 

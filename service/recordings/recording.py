@@ -51,11 +51,13 @@ class Recording:
     quality: str | None = None
 
     def __post_init__(self) -> None:
-        self._check_shapes()
-        self._check_values()
-        self._check_time()
-        self._check_truth()
-        self._check_scale()
+        # Values that overflow are found by the checks, which say where they are.
+        with np.errstate(all="ignore"):
+            self._check_shapes()
+            self._check_values()
+            self._check_time()
+            self._check_truth()
+            self._check_scale()
 
     def __len__(self) -> int:
         return len(self.t_s)
