@@ -10,6 +10,7 @@ between peak and valley, else rest. The window is as long as the mean spacing of
 | --- | --- | --- | --- |
 | axes | xz | norm | (4); the norm is its first variant, Table 2 |
 | half_width | 2 | 1 | N is not printed: ours |
+| ties | break | go_on | (7)(8) are strict; a crest of two equal samples, common at few bits, is then no peak |
 | valleys | 2 | 2 | "one or two"; read as valleys, since the samples n+1, n+2 are never that low |
 | valley_wait | 100 | 50 | no bound is printed: ours, so that latency has one |
 | rest_raw, lsb_per_g | 1, 32 | 5.75, 32 | 2.5.2; the unit is ours: Table 1's norms average 32 |
@@ -69,6 +70,9 @@ FILTER_DELAY: Final = 2
 MOVING_SAMPLES: Final = 300
 """Samples a window length is taken from (section 2.3)."""
 
+NO_RUN: Final = 1e300
+"""Longer than any run of rises or falls."""
+
 COMPILED_FROM: Final = 2000
 """A block longer than this goes through the compiled kernel, if numba is there."""
 
@@ -82,6 +86,7 @@ class DoubleThresholdParams:
 
     axes: str = choice("xz", options=("xz", "norm"), text="magnitude of X and Z (4), or of all three axes")
     half_width: int = parameter(2, unit="samples", low=1, high=4, text="rises before and falls after a peak, N")
+    ties: str = choice("break", options=("break", "go_on"), text="what equal values do to a run of rises or falls")
     valleys: int = parameter(2, unit="valleys", low=1, high=4, text="valleys after a peak of which one must be low")
     valley_wait: int = parameter(100, unit="samples", low=10, high=250, text="how long a peak waits for its valleys")
     rest_raw: float = parameter(1.0, unit="raw units", low=0, high=64, text="smaller peak-to-valley is rest")
@@ -105,6 +110,7 @@ PAPER: Final = DoubleThresholdParams()
 TUNED: Final = DoubleThresholdParams(
     axes="norm",
     half_width=1,
+    ties="go_on",
     valley_wait=50,
     rest_raw=5.75,
     lower_share=0.4,
@@ -245,7 +251,7 @@ def sampled_window(block: SampleBlock, params: DoubleThresholdParams) -> int:
 
     Published mode (a): one walk a person and pace, of a set number of steps or a set time.
     """
-    counter = DoubleThreshold(replace(params, window_mode="fixed"))
+    counter = DoubleThreshold(replace(params, window_mode="fixed", credit="retrospective"))
     steps = counter.update(block).steps + counter.finish().steps
     spacings = [step.interval_s * GRID_HZ for step in steps if step.interval_s is not None]
     if not spacings:
@@ -266,6 +272,7 @@ def _fresh_state(p: DoubleThresholdParams) -> list[float]:
     s = [0.0] * (kernel.QUEUE + capacity * kernel.ENTRY)
     s[kernel.Y_WEIGHT] = 1.0 if p.axes == "norm" else 0.0
     s[kernel.HALF] = float(p.half_width)
+    s[kernel.TIES] = 0.0 if p.ties == "go_on" else NO_RUN
     s[kernel.VALLEYS] = float(p.valleys)
     s[kernel.WAIT] = float(p.valley_wait)
     s[kernel.REST] = p.rest_raw / p.lsb_per_g

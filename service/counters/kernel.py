@@ -16,53 +16,54 @@ from typing import Final
 # Constants of an instance.
 Y_WEIGHT: Final = 0  # 1 for the norm, 0 for √(X²+Z²)
 HALF: Final = 1  # N of (7), (8)
-VALLEYS: Final = 2  # how many valleys a peak may look at
-WAIT: Final = 3  # how many samples it waits for them
-REST: Final = 4  # g; less between peak and valley is rest
-LOWER_SHARE: Final = 5  # T_L = L + this share of H − L
-MIN_SPACING: Final = 6
-MAX_SPACING: Final = 7
-BOUT: Final = 8  # valid peaks that make a bout certain
-CREDIT: Final = 9  # 1: the peaks before it was certain count too
-LIMIT: Final = 10  # window length above which it is halved
-REFRESH: Final = 11  # moving samples after which the window length is taken anew; 0 never
-CAPACITY: Final = 12  # of the queue of undecided peaks
-CONSTANTS: Final = 13
+TIES: Final = 2  # equal values go on a run longer than this: 0, or more than any run
+VALLEYS: Final = 3  # how many valleys a peak may look at
+WAIT: Final = 4  # how many samples it waits for them
+REST: Final = 5  # g; less between peak and valley is rest
+LOWER_SHARE: Final = 6  # T_L = L + this share of H − L
+MIN_SPACING: Final = 7
+MAX_SPACING: Final = 8
+BOUT: Final = 9  # valid peaks that make a bout certain
+CREDIT: Final = 10  # 1: the peaks before it was certain count too
+LIMIT: Final = 11  # window length above which it is halved
+REFRESH: Final = 12  # moving samples after which the window length is taken anew; 0 never
+CAPACITY: Final = 13  # of the queue of undecided peaks
+CONSTANTS: Final = 14
 
 # Belief: it outlasts a gap.
-WINDOW: Final = 13  # window length in samples
-HIGH: Final = 14  # H
-LOW: Final = 15  # L
-HIGH_KNOWN: Final = 16
-LOW_KNOWN: Final = 17
-SPACING_SUM: Final = 18  # of the moving samples since the length was taken
-SPACINGS: Final = 19
+WINDOW: Final = 14  # window length in samples
+HIGH: Final = 15  # H
+LOW: Final = 16  # L
+HIGH_KNOWN: Final = 17
+LOW_KNOWN: Final = 18
+SPACING_SUM: Final = 19  # of the moving samples since the length was taken
+SPACINGS: Final = 20
 
 # The bout: once certain it outlasts a short gap.
-BOUT_PEAKS: Final = 20  # valid peaks so far
-LAST: Final = 21  # index of the last one
+BOUT_PEAKS: Final = 21  # valid peaks so far
+LAST: Final = 22  # index of the last one
 
 # The stretch: it ends with a gap.
-FIRST: Final = 22  # index of its first sample
-NEXT: Final = 23  # index of the sample to come; −1 before the first stretch and after the last
-M1: Final = 24  # the four magnitudes before
-M2: Final = 25
-M3: Final = 26
-M4: Final = 27
-FILTERED: Final = 28  # X(n − 1)
-RUN: Final = 29  # > 0 rises, < 0 falls in a row up to now
-RUN_BEFORE: Final = 30  # length of the opposite run before
-TURN: Final = 31  # the value between both
-WINDOW_FROM: Final = 32
-CLOSE_AT: Final = 33
-PEAK_SUM: Final = 34
-PEAKS: Final = 35
-VALLEY_SUM: Final = 36
-VALLEYS_SEEN: Final = 37
-HEAD: Final = 38
-COUNT: Final = 39
+FIRST: Final = 23  # index of its first sample
+NEXT: Final = 24  # index of the sample to come; −1 before the first stretch and after the last
+M1: Final = 25  # the four magnitudes before
+M2: Final = 26
+M3: Final = 27
+M4: Final = 28
+FILTERED: Final = 29  # X(n − 1)
+RUN: Final = 30  # > 0 rises, < 0 falls in a row up to now
+RUN_BEFORE: Final = 31  # length of the opposite run before
+TURN: Final = 32  # the value between both
+WINDOW_FROM: Final = 33
+CLOSE_AT: Final = 34
+PEAK_SUM: Final = 35
+PEAKS: Final = 36
+VALLEY_SUM: Final = 37
+VALLEYS_SEEN: Final = 38
+HEAD: Final = 39
+COUNT: Final = 40
 
-HELD: Final = 40
+HELD: Final = 41
 """Rows of `HELD_MAX` valid peaks of a bout that is not certain yet."""
 
 ROW: Final = 7
@@ -105,7 +106,7 @@ def begin(s: State, index: int, magnitude: float) -> None:
 
 def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
     """Eat n samples (g); write X(n) to `out[:n]` and rows after it; return where the rows end."""
-    y_weight, half = s[Y_WEIGHT], s[HALF]
+    y_weight, half, ties = s[Y_WEIGHT], s[HALF], s[TIES]
     m1, m2, m3, m4 = s[M1], s[M2], s[M3], s[M4]
     last, run, run_before, turn = s[FILTERED], s[RUN], s[RUN_BEFORE], s[TURN]
     k, close_at, end_of_rows = s[NEXT], s[CLOSE_AT], n
@@ -115,14 +116,14 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
         filtered = (m + m1 + m2 + m3 + m4) / 5.0
         m1, m2, m3, m4 = m, m1, m2, m3
         out[i] = filtered
-        if filtered > last:
+        if filtered > last or (filtered == last and run > ties):
             if run > 0.0:
                 run += 1.0
             else:
                 run_before, run, turn = -run, 1.0, last
             if run == half and run_before >= half:
                 end_of_rows = _valley(s, k - half, turn, out, end_of_rows)
-        elif filtered < last:
+        elif filtered < last or (filtered == last and run < -ties):
             if run < 0.0:
                 run -= 1.0
             else:
@@ -155,7 +156,7 @@ def end(s: State, out: State) -> int:
 def pending(s: State) -> int:
     """Return how many peaks are likely to become steps: the bout's held ones, and undecided ones above T_H."""
     likely = 0
-    if s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT]:
+    if s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT] and s[NEXT] - s[HALF] - s[LAST] < s[MAX_SPACING]:
         likely = int(s[BOUT_PEAKS])
     if s[HIGH_KNOWN] == 0.0 or s[LOW_KNOWN] == 0.0:
         return likely
@@ -266,10 +267,13 @@ def _valid(s: State, q: int, out: State, rows: int) -> int:
         return _row(out, rows, STEP, at, spacing, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
     last = HELD + (int(s[BOUT_PEAKS]) - 1) * ROW
     _row(s, last, STEP, at, spacing, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
-    if s[BOUT_PEAKS] == s[BOUT]:
-        for i in range(HELD if s[CREDIT] > 0.0 else last, last + ROW):
-            out[rows] = s[i]
-            rows += 1
+    if s[BOUT_PEAKS] < s[BOUT]:
+        return rows
+    if s[CREDIT] == 0.0:
+        return _row(out, rows, STEP, at, 0.0, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
+    for i in range(HELD, last + ROW):
+        out[rows] = s[i]
+        rows += 1
     return rows
 
 

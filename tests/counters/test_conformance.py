@@ -1,0 +1,98 @@
+"""Every counter and preset of the registry against the public suite."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+from counters import conformance
+from counters.conformance import Make, Signal, cut_signals, signals, walk
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from service.counters import registry
+
+VARIANTS = [(name, preset) for name in registry.COUNTERS for preset in registry.COUNTERS[name].presets]
+
+SLACK = {("double_threshold", "paper"): 24}
+"""T_L = L lets only valleys under their own mean pass, and on an even walk half of them are not."""
+
+few = settings(max_examples=40, deadline=None)
+
+
+@pytest.fixture(params=VARIANTS, ids=lambda v: f"{v[0]}-{v[1]}", scope="module")
+def make(request: pytest.FixtureRequest) -> Make:
+    return partial(registry.make, *request.param)
+
+
+@few
+@given(cut=cut_signals())
+def test_any_cutting_gives_the_same(make, cut):
+    conformance.check_cutting(make, *cut)
+
+
+@few
+@given(signal=signals(), share=st.floats(0, 1))
+def test_resumes_from_a_snapshot_after_any_sample(make, signal, share):
+    conformance.check_resume(make, signal, round(share * (len(signal) - 1)))
+
+
+@few
+@given(signal=signals())
+def test_steps_agree_with_each_other_and_with_the_trace(make, signal):
+    conformance.check_steps(make, signal)
+
+
+@few
+@given(signal=signals())
+def test_declared_latency_holds(make, signal):
+    conformance.check_latency(make, signal)
+
+
+@few
+@given(signal=signals(), share=st.floats(0, 1), gap=st.integers(31, 600))
+def test_no_step_in_a_gap(make, signal, share, gap):
+    conformance.check_gap(make, signal, round(share * (len(signal) - 1)), gap)
+
+
+@settings(max_examples=8, deadline=None)
+@given(signal=signals(), samples=st.integers(2100, 6000))
+def test_a_long_block_equals_packets(make, signal, samples):
+    conformance.check_long_block(make, signal, samples)
+
+
+@few
+@given(signal=signals())
+def test_nothing_pends_after_the_end(make, signal):
+    conformance.check_finished(make, signal)
+
+
+@pytest.mark.parametrize("value_g", [0.0, 0.1, 1.0, -0.7])
+def test_silence_has_no_steps(make, value_g):
+    conformance.check_silence(make, value_g)
+
+
+@pytest.mark.parametrize("step_hz", [1.1, 1.7, 2.1, 2.9])
+@pytest.mark.parametrize("swing_g", [0.2, 0.6])
+def test_a_clean_walk_is_counted(make, step_hz, swing_g):
+    conformance.check_walk(make, step_hz, swing_g, slack=SLACK.get(make.args, 2))
+
+
+def test_foreign_snapshots_are_refused(make):
+    state = make().snapshot()
+    others = [registry.make(name, preset) for name, preset in VARIANTS]
+    assert len(others) > 1
+    conformance.check_foreign_snapshot(make, [o for o in others if o.snapshot()["params"] != state["params"]])
+
+
+def test_the_suite_catches_a_counter_that_loses_the_packet_border():
+    class Forgetful:
+        def __new__(cls):
+            counter = registry.make("double_threshold")
+            update = counter.update
+            counter.update = lambda block: (counter.finish(), update(block))[1]
+            return counter
+
+    signal = Signal(walk(600, 2.0, 0.6))
+    with pytest.raises(AssertionError):
+        conformance.check_cutting(Forgetful, signal, [0, 150, 300, 600])
