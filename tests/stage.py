@@ -1,0 +1,78 @@
+"""The whole service on stage, in this process: a simulated bracelet, the virtual radio, and a real HTTP server."""
+
+import asyncio
+import contextlib
+from dataclasses import dataclass
+
+import httpx
+import websockets
+
+from device_sim.air import LocalAir
+from device_sim.gatt import GattBracelet
+from service.api.app import create_app
+from service.api.server import address, listen, serve
+from service.counters.registry import DEFAULT, make
+from service.links.ble import Backend
+from service.pipeline.hub import Hub
+from service.pipeline.supervisor import Supervisor
+from service.tracking.tracker import Tracker
+from service.wearables.bracelet import Bracelet as Protocol
+
+
+@dataclass
+class Stage:
+    """What a test may touch: the service by HTTP, its supervisor, and the bracelet's radio."""
+
+    url: str
+    http: httpx.AsyncClient
+    supervisor: Supervisor
+    bracelet: GattBracelet
+
+    @property
+    def live_url(self):
+        return self.url.replace("http", "ws", 1) + "api/v1/live"
+
+    def live(self, query="", **options):
+        return websockets.connect(self.live_url + query, max_size=None, proxy=None, **options)
+
+    async def device(self, key="sim-1"):
+        answer = await self.http.get(f"api/v1/devices/{key}")
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+    async def until(self, condition, *, within_s=10.0):
+        """Wait until `condition(device)` holds; return the device."""
+        async with asyncio.timeout(within_s):
+            while True:
+                answer = await self.http.get("api/v1/devices/sim-1")
+                if answer.status_code == 200 and condition(answer.json()):
+                    return answer.json()
+                await asyncio.sleep(0.02)
+
+
+def default_tracker(wearable):
+    return Tracker(wearable, {DEFAULT: lambda: make(DEFAULT)}, primary=DEFAULT)
+
+
+@contextlib.asynccontextmanager
+async def staged(bracelet, *, durable_limit=1000, wanted=None, **radio):
+    """Run the service over a bracelet on a local air; everything is closed and joined at the end."""
+    async with LocalAir() as air, air.bracelet(bracelet, **radio) as gatt, air.central() as central:
+        supervisor = Supervisor(
+            hub=Hub(durable_limit=durable_limit),
+            make_wearable=Protocol,
+            make_tracker=default_tracker,
+            wanted=wanted,
+            backend=Backend(scanner=central.scanner, client=central.client),
+        )
+        bound = listen("127.0.0.1", 0)
+        url, ready = address(bound), asyncio.Event()
+        server = asyncio.create_task(serve(create_app(supervisor), bound, on_ready=ready.set))
+        try:
+            async with asyncio.timeout(10):
+                await ready.wait()
+            async with httpx.AsyncClient(base_url=url, trust_env=False) as http:
+                yield Stage(url, http, supervisor, gatt)
+        finally:
+            server.cancel()
+            await asyncio.gather(server, return_exceptions=True)
