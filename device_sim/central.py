@@ -1,0 +1,197 @@
+"""The host's side of an air: one bumble device, opened when it is first needed and again after the air was lost.
+
+Every HCI command runs in a task of its own that is never cancelled half-way: bumble gives a late answer to whichever
+command comes next. A caller that is cancelled leaves its command to finish; the central owns the task.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from contextlib import AsyncExitStack, suppress
+from types import TracebackType
+from typing import Any, Final, Self, TypeVar
+
+from bleak.exc import (
+    BleakBluetoothNotAvailableError,
+    BleakBluetoothNotAvailableReason,
+    BleakError,
+    BleakGATTProtocolError,
+)
+from bumble import att, hci
+from bumble.core import BaseBumbleError
+from bumble.device import Advertisement, Connection, Device
+
+from device_sim.controller import Air
+from service.errors import LinkError
+
+HCI_TIMEOUT_S: Final = 5.0
+"""A controller answers in milliseconds; one that does not is gone."""
+CANCEL_TIMEOUT_S: Final = 0.5
+"""What a cancelled connect waits for the controller to confirm; milliseconds where it is alive."""
+
+T = TypeVar("T")
+Listener = Callable[[Advertisement], None]
+
+
+class Central:
+    """A host on an air while entered; usable by any number of scanners and clients at once."""
+
+    def __init__(self, air: Air, name: str = "central") -> None:
+        self._air = air
+        self._name = name
+        self._device: Device | None = None
+        self._attachment = AsyncExitStack()
+        self._opening = asyncio.Lock()
+        self._connecting = asyncio.Lock()
+        self._scanning = asyncio.Lock()
+        self._listeners: list[Listener] = []
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._closed = False
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closed = True
+        await self._close()
+
+    def statistics(self) -> dict[str, int]:
+        """Return how many scanners, links and unfinished operations there are."""
+        links = 0 if self._device is None else len(self._device.connections)
+        return {"scanners": len(self._listeners), "links": links, "operations": len(self._tasks)}
+
+    async def device(self) -> Device:
+        """Return the powered-on device; BleakBluetoothNotAvailableError (a BleakError) where there is no air."""
+        async with self._opening:
+            if self._device is None:
+                if self._closed:
+                    raise _unavailable("this central was closed")
+                try:
+                    self._device = await self._open()
+                except (LinkError, TimeoutError, BaseBumbleError, asyncio.InvalidStateError) as error:
+                    await self._close()
+                    raise _unavailable(f"no controller: {error}") from error
+            return self._device
+
+    async def connect(self, address: hci.Address) -> Connection:
+        """Connect, waiting for ever; when cancelled, the controller's attempt is cancelled too."""
+        async with self._connecting:  # a controller makes one connection at a time
+            device = await self.device()
+            attempt = self._spawn(device.connect(address, timeout=None))
+            try:
+                await asyncio.wait({attempt})
+            finally:
+                if not attempt.done():
+                    await self._abandon(device, attempt)
+            return outcome(attempt)
+
+    async def disconnect(self, connection: Connection) -> None:
+        """Ask for the end of a connection; its event tells when it has ended."""
+        if connection.device is not self._device:
+            return
+        command = hci.HCI_Disconnect_Command(
+            connection_handle=connection.handle, reason=hci.HCI_ErrorCode.REMOTE_USER_TERMINATED_CONNECTION_ERROR
+        )
+        await self._command(connection.device.send_async_command(command, check_status=False))
+
+    async def listen(self, listener: Listener) -> None:
+        """Call `listener` with every advertisement from now on."""
+        async with self._scanning:
+            device = await self.device()
+            if not device.is_scanning:
+                # Active: the virtual controller reports every advertisement twice, and this merges the two.
+                await self._command(device.start_scanning(active=True, filter_duplicates=False))
+            device.on(Device.EVENT_ADVERTISEMENT, listener)
+            self._listeners.append(listener)
+
+    async def ignore(self, listener: Listener) -> None:
+        """Call `listener` no more; the last one ends the scan."""
+        if listener not in self._listeners:
+            return
+        self._listeners.remove(listener)
+        async with self._scanning:
+            device = self._device
+            if device is None:
+                return
+            with suppress(KeyError):  # the air was lost meanwhile: this is another device
+                device.remove_listener(Device.EVENT_ADVERTISEMENT, listener)
+            if not self._listeners and device.is_scanning:
+                await self._command(device.stop_scanning())
+
+    async def _open(self) -> Device:
+        transport = await self._attachment.enter_async_context(self._air.attach(self._name))
+        address = hci.Address.generate_static_address()
+        device = Device.with_hci(self._name, address, transport.source, transport.sink)
+        async with asyncio.timeout(HCI_TIMEOUT_S):
+            await device.power_on()
+        transport.source.terminated.add_done_callback(lambda _: self._forget(device))
+        return device
+
+    async def _close(self) -> None:
+        """Give the controller back, which ends all links, and what still waits for it."""
+        device, self._device = self._device, None
+        attachment, self._attachment = self._attachment, AsyncExitStack()
+        await attachment.aclose()
+        pending = set(self._tasks)
+        while pending:  # bumble's wait_for swallows a cancellation that comes with its answer (before Python 3.12)
+            for task in pending:
+                task.cancel()
+            _, pending = await asyncio.wait(pending, timeout=CANCEL_TIMEOUT_S)
+        if device is not None:
+            self._listeners.clear()
+
+    def _forget(self, device: Device) -> None:
+        """Drop a device whose air was lost: bumble has ended its links already, the next use opens anew."""
+        if self._device is device:
+            self._device = None
+            self._listeners.clear()
+
+    async def _command(self, command: Coroutine[Any, Any, T]) -> T:
+        """Carry an HCI command through, whatever becomes of the caller; BleakError where it fails."""
+        task = self._spawn(command)
+        done, _ = await asyncio.wait({task}, timeout=HCI_TIMEOUT_S)
+        if not done:
+            await self._close()
+            raise BleakError("the controller does not answer: it was given up, the next use opens it anew")
+        return outcome(task)
+
+    async def _abandon(self, device: Device, attempt: asyncio.Task[Connection]) -> None:
+        """End an attempt to connect, and the connection too where it was made in the last moment."""
+        self._spawn(device.send_sync_command(hci.HCI_LE_Create_Connection_Cancel_Command()))
+        await asyncio.wait({attempt}, timeout=CANCEL_TIMEOUT_S)
+        if not attempt.done():
+            await self._close()
+        elif not attempt.cancelled() and attempt.exception() is None:
+            self._spawn(attempt.result().disconnect())
+
+    def _spawn(self, operation: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+        task = asyncio.create_task(operation, name=f"{self._name} operation")
+        self._tasks.add(task)
+        task.add_done_callback(self._finished)
+        return task
+
+    def _finished(self, task: asyncio.Task[Any]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled():
+            task.exception()  # whoever waited has it; where nobody does, asyncio need not complain
+
+
+def outcome(task: asyncio.Task[T]) -> T:
+    """Return a finished bumble operation's result, its error as bleak's own."""
+    if task.cancelled():
+        raise BleakError("disconnected: bumble gave the operation up with the link")
+    error = task.exception()
+    if error is None:
+        return task.result()
+    if isinstance(error, att.ATT_Error):
+        raise BleakGATTProtocolError(int(error.error_code)) from error
+    if isinstance(error, BaseBumbleError):
+        raise BleakError(f"{type(error).__name__}: {error}") from error
+    raise error
+
+
+def _unavailable(why: str) -> BleakBluetoothNotAvailableError:
+    return BleakBluetoothNotAvailableError(why, BleakBluetoothNotAvailableReason.NO_BLUETOOTH)

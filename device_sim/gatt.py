@@ -1,0 +1,256 @@
+"""The bracelet on the air: measures as time passes, notifies whoever subscribed, and fails on request.
+
+Time goes on whether anybody listens or not, and while the air is away; what nobody takes is lost. Samples are paced
+against the loop's clock, so nothing drifts: after a pause, what has fallen due meanwhile is measured at once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import Final, Self
+
+from device_sim.bracelet import Bracelet
+from device_sim.controller import Air
+from device_sim.peripheral import DEFAULT_MTU, Peripheral, advertisement
+from service.errors import LinkError, ParameterError
+
+REOPEN_S: Final = 0.5
+"""How long a bracelet waits before it looks for a lost air again."""
+
+
+class Start(StrEnum):
+    """When the source begins: at power-on as a real one, or with its first sample for the first subscriber."""
+
+    POWER_ON = "power_on"
+    ON_SUBSCRIBE = "on_subscribe"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GattStatistics:
+    """Packets since power-on (`packets` taken by a host), links made, and what became of the samples."""
+
+    packets: int
+    links: int
+    measured: int
+    sent: int
+    lost: int
+    waiting: int
+    saturated: int
+
+
+class GattBracelet:
+    """A bracelet that advertises and serves on an air while entered.
+
+    `speed` is device seconds per second; `math.inf` plays as fast as the subscriber takes it, and stands still while
+    there is none. `name` has at most 8 bytes, `max_mtu` is the largest ATT MTU agreed to (23…517). `played` is set once
+    a finite source has been played to its end. `distort` maps an outgoing packet to those that are sent instead: none
+    loses it, two duplicate it.
+    """
+
+    def __init__(
+        self,
+        bracelet: Bracelet,
+        air: Air,
+        *,
+        name: str = "Steplink",
+        speed: float = 1.0,
+        start: Start = Start.POWER_ON,
+        max_mtu: int = 517,
+    ) -> None:
+        if not speed > 0:
+            raise ParameterError("speed", speed, "above 0, or inf")
+        if not DEFAULT_MTU <= max_mtu <= 517:
+            raise ParameterError("max_mtu", max_mtu, "23 to 517 bytes")
+        advertisement(name)  # raises here rather than on the air
+        self.bracelet = bracelet
+        self.played = asyncio.Event()
+        self.distort: Callable[[bytes], Iterable[bytes]] | None = None
+        self._air = air
+        self._name = name
+        self._speed = speed
+        self._start = Start(start)
+        self._max_mtu = max_mtu
+        self._peripheral: Peripheral | None = None
+        self._away = self._muted = False
+        self._corrupt = 0
+        self._packets = 0
+        self._links_before = 0
+        self._listened = asyncio.Event()
+        self._attached = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+
+    async def __aenter__(self) -> Self:
+        self._task = asyncio.create_task(self._run(), name=f"bracelet {self.bracelet.device_id}")
+        attached = asyncio.ensure_future(self._attached.wait())
+        try:
+            await asyncio.wait({self._task, attached}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            attached.cancel()
+            if not self._attached.is_set():
+                await self._stop()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self._stop()
+
+    @property
+    def connected(self) -> bool:
+        """Whether a host is linked."""
+        return self._peripheral is not None and self._peripheral.link is not None
+
+    @property
+    def subscribed(self) -> bool:
+        """Whether a host takes data (and the bracelet is not silenced)."""
+        return self._peripheral is not None and self._peripheral.listening
+
+    def statistics(self) -> GattStatistics:
+        """Return counts since power-on."""
+        links = self._links_before + (self._peripheral.links_made if self._peripheral else 0)
+        return GattStatistics(packets=self._packets, links=links, **asdict(self.bracelet.statistics()))
+
+    async def set_battery(self, percent: int) -> None:
+        """Set the charge (0…100 %) and notify it."""
+        self.bracelet.battery_percent = percent
+        if self._peripheral is not None:
+            await self._peripheral.notify_battery()
+
+    # Faults, each as the wearer or the air would cause it.
+
+    async def drop_link(self) -> None:
+        """Lose the link as by a supervision timeout; advertise again."""
+        if self._peripheral is not None:
+            await self._peripheral.drop()
+
+    def silence(self) -> None:
+        """Send and answer nothing more; the link stays up."""
+        self._mute(muted=True)
+
+    def speak(self) -> None:
+        """End a silence."""
+        self._mute(muted=False)
+
+    def corrupt_next(self, packets: int = 1) -> None:
+        """Break the first byte of the next packets, so that their version is none."""
+        self._corrupt += packets
+
+    async def go_away(self) -> None:
+        """Leave the host's range: no link, no advertising. The sensor goes on."""
+        await self._range(away=True)
+
+    async def come_back(self) -> None:
+        """Come back into range."""
+        await self._range(away=False)
+
+    async def reboot(self) -> None:
+        """Start again: next boot number, samples and ticks from 0, no link."""
+        self.bracelet.reset()
+        await self.drop_link()
+
+    def _mute(self, *, muted: bool) -> None:
+        self._muted = muted
+        if self._peripheral is not None:
+            self._peripheral.muted = muted
+            if self._peripheral.listening:
+                self._listened.set()
+
+    async def _range(self, *, away: bool) -> None:
+        self._away = away
+        if self._peripheral is not None:
+            self._peripheral.away = away
+            await self._peripheral.settle()
+            if away:
+                await self._peripheral.drop()
+
+    async def _run(self) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._stay_on_air())
+            tasks.create_task(self._play())
+
+    async def _stop(self) -> None:
+        task, self._task = self._task, None
+        if task is None:
+            return
+        task.cancel()
+        await asyncio.wait({task})
+        if not task.cancelled() and (error := task.exception()) is not None:
+            raise _first(error)
+
+    async def _stay_on_air(self) -> None:
+        while True:
+            try:
+                async with self._air.attach(self._name) as transport:
+                    self._peripheral = Peripheral(
+                        transport,
+                        self.bracelet,
+                        name=self._name,
+                        max_mtu=self._max_mtu,
+                        on_subscribed=self._listened.set,
+                    )
+                    self._peripheral.muted, self._peripheral.away = self._muted, self._away
+                    await self._peripheral.start()
+                    self._attached.set()
+                    await self._peripheral.serve()
+            except LinkError:
+                if not self._attached.is_set():
+                    raise
+            finally:
+                if self._peripheral is not None:
+                    self._links_before += self._peripheral.links_made
+                self._peripheral = None
+            await asyncio.sleep(REOPEN_S)
+
+    async def _play(self) -> None:
+        if self._start is Start.ON_SUBSCRIBE:
+            await self._listened.wait()
+        await (self._play_flat_out() if math.isinf(self._speed) else self._play_paced())
+        self.played.set()
+
+    async def _play_paced(self) -> None:
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        rate_hz = self.bracelet.rate_hz * self._speed
+        measured = 0
+        while not self.bracelet.ended:
+            due = int((loop.time() - began) * rate_hz + 1e-6)
+            measured += self.bracelet.measure(due - measured)
+            await self._send()
+            full = measured + max(1, self.bracelet.wanting(self._mtu))
+            await asyncio.sleep(max(0.0, began + full / rate_hz - loop.time()))
+
+    async def _play_flat_out(self) -> None:
+        while not self.bracelet.ended:
+            if not self.subscribed:
+                self._listened.clear()
+                await self._listened.wait()
+                continue
+            self.bracelet.measure(self.bracelet.wanting(self._mtu))
+            await self._send()
+            await asyncio.sleep(0)
+
+    @property
+    def _mtu(self) -> int:
+        return DEFAULT_MTU if self._peripheral is None else self._peripheral.mtu
+
+    async def _send(self) -> None:
+        """Notify every full packet; discard what nobody takes."""
+        while self.subscribed and (packet := self.bracelet.next_packet(self._mtu)):
+            if self._corrupt:
+                self._corrupt -= 1
+                packet = bytes([packet[0] ^ 0xFF]) + packet[1:]
+            for value in (packet,) if self.distort is None else self.distort(packet):
+                if self._peripheral is not None and await self._peripheral.notify(value):
+                    self._packets += 1
+        if not self.subscribed:
+            self.bracelet.discard()
+
+
+def _first(error: BaseException) -> BaseException:
+    """Return the first error of a group: which of the bracelet's tasks failed is its own affair."""
+    return _first(error.exceptions[0]) if isinstance(error, BaseExceptionGroup) else error

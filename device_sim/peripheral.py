@@ -1,0 +1,238 @@
+"""One power-on of the bracelet's Bluetooth side: GATT table, advertising, at most one link.
+
+One object is one attachment to an air, never used again. It knows what is said and how; what is measured and when is
+`device_sim.gatt`'s.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from collections.abc import Awaitable, Callable
+from typing import Final
+
+from bumble import att, data_types, hci
+from bumble.core import UUID, AdvertisingData, BaseBumbleError
+from bumble.device import Connection, Device, DeviceConfiguration
+from bumble.gatt import Characteristic, CharacteristicValue, Service
+from bumble.host import Host
+from bumble.transport.common import Transport
+
+from device_sim.bracelet import Bracelet
+from service.errors import LinkError, LinkFault, ParameterError
+from service.wearables import bracelet as wire
+
+HCI_TIMEOUT_S: Final = 5.0
+"""A controller answers in milliseconds; one that does not is gone."""
+STALL_S: Final = 5.0
+"""A host that takes no packet for so long has lost the link, as by a supervision timeout."""
+UNSENT_PACKETS: Final = 16
+"""Packets the controller may hold before the sender waits for it."""
+ADVERTISING_INTERVAL_MS: Final = 62.5
+"""100 ms on the air: bumble's controller takes the 0.625 ms units for milliseconds."""
+NAME_BYTES: Final = 8
+"""What 31 bytes hold beside flags and a 128-bit UUID; the link carries no scan response."""
+DEFAULT_MTU: Final = 23
+
+_P = Characteristic.Properties
+
+
+def static_address(device_id: str) -> hci.Address:
+    """Return the random static address of a device: always the same for the same id."""
+    digest = bytearray(hashlib.sha256(device_id.encode()).digest()[:6])
+    digest[5] |= 0xC0
+    return hci.Address(bytes(digest), hci.Address.RANDOM_DEVICE_ADDRESS)
+
+
+def advertisement(name: str) -> bytes:
+    """Return flags, service UUID and name in at most 31 bytes."""
+    if not 1 <= len(name.encode()) <= NAME_BYTES:
+        raise ParameterError("name", name, f"1 to {NAME_BYTES} bytes of UTF-8 fit the advertisement")
+    flags = AdvertisingData.Flags.LE_GENERAL_DISCOVERABLE_MODE | AdvertisingData.Flags.BR_EDR_NOT_SUPPORTED
+    return bytes(
+        AdvertisingData(
+            [
+                data_types.Flags(flags),
+                data_types.CompleteListOf128BitServiceUUIDs([UUID(wire.SERVICE)]),
+                data_types.CompleteLocalName(name),
+            ]
+        )
+    )
+
+
+class Peripheral:
+    """A bumble device that serves one bracelet's table.
+
+    `on_subscribed` is called when a host asks for data. While `muted` is set it sends nothing and answers nothing;
+    while `away` is set it does not advertise.
+    """
+
+    def __init__(
+        self, transport: Transport, bracelet: Bracelet, *, name: str, max_mtu: int, on_subscribed: Callable[[], None]
+    ) -> None:
+        config = DeviceConfiguration(
+            name=name,
+            address=static_address(bracelet.device_id),
+            advertising_data=advertisement(name),
+            advertising_interval_min=ADVERTISING_INTERVAL_MS,
+            advertising_interval_max=ADVERTISING_INTERVAL_MS,
+        )
+        host = Host(transport.source, transport.sink)
+        self.device = Device(config=config, host=host)
+        self.device.gatt_server.max_mtu = max_mtu
+        self.muted = False
+        self.away = False
+        self.links_made = 0
+        self._data = _characteristic(wire.DATA, _P.NOTIFY, lambda: b"")
+        self._battery = _characteristic(wire.BATTERY_LEVEL, _P.READ | _P.NOTIFY, bracelet.battery_value)
+        self.device.add_services(_services(bracelet, self._data, self._battery))
+        self._on_subscribed = on_subscribed
+        self._subscribed = False
+        self._link: Connection | None = None
+        self._advertising = False
+        self._lost = transport.source.terminated
+        self._changed = asyncio.Event()
+        self._lock = asyncio.Lock()
+        self._data.on(Characteristic.EVENT_SUBSCRIPTION, self._on_subscription)
+        self.device.on(Device.EVENT_CONNECTION, self._on_connection)
+        self.device.l2cap_channel_manager.register_fixed_channel(att.ATT_CID, self._on_att)
+
+    @property
+    def link(self) -> Connection | None:
+        """The link to a host, None where there is none."""
+        return self._link
+
+    @property
+    def mtu(self) -> int:
+        """The ATT MTU in force, in bytes."""
+        return DEFAULT_MTU if self._link is None else self._link.att_mtu
+
+    @property
+    def listening(self) -> bool:
+        """Whether a notification of data would reach a host."""
+        return self._subscribed and not self.muted
+
+    async def start(self) -> None:
+        """Power on and advertise; LinkError where the controller does not answer."""
+        self._lost.add_done_callback(lambda _: self._changed.set())
+        await self._hci(self.device.power_on())
+        await self.settle()
+
+    async def serve(self) -> None:
+        """Advertise whenever there is no link, until the air is lost."""
+        while not self._lost.done():
+            await self._changed.wait()
+            self._changed.clear()
+            await self.settle()
+
+    async def settle(self) -> None:
+        """Begin or end advertising as `away` and the link want it."""
+        async with self._lock:
+            wanted = not self.away and self._link is None
+            if wanted != self._advertising and self.device.powered_on and not self._lost.done():
+                self._advertising = wanted
+                await self._hci(self.device.start_advertising() if wanted else self.device.stop_advertising())
+
+    async def notify(self, value: bytes) -> bool:
+        """Send one value of the data characteristic; wait while the radio is full. False where nobody took it."""
+        link = self._link
+        if link is None or not self.listening:
+            return False
+        await self.device.gatt_server.notify_subscriber(link, self._data, value)
+        queue = self.device.host.le_acl_packet_queue
+        if queue is not None and queue.pending > UNSENT_PACKETS:
+            try:
+                async with asyncio.timeout(STALL_S):
+                    await queue.drain(link.handle)
+            except ValueError:  # bumble: no such connection (any more)
+                return False
+            except TimeoutError:
+                await self.drop()
+                return False
+        return True
+
+    async def notify_battery(self) -> None:
+        """Send the battery's charge to whoever subscribed to it."""
+        if self._link is not None and not self.muted:
+            await self.device.gatt_server.notify_subscriber(self._link, self._battery)
+
+    async def drop(self, reason: int = hci.HCI_ErrorCode.CONNECTION_TIMEOUT_ERROR) -> None:
+        """End the link, by default as if it had been out of range; return when it has ended."""
+        link = self._link
+        if link is None:
+            return
+        gone = asyncio.Event()
+        link.once(Connection.EVENT_DISCONNECTION, lambda _: gone.set())
+        await self._hci(
+            self.device.send_async_command(
+                hci.HCI_Disconnect_Command(connection_handle=link.handle, reason=reason), check_status=False
+            )
+        )
+        await self._hci(gone.wait())
+
+    async def _hci(self, command: Awaitable[object]) -> None:
+        task = asyncio.current_task()
+        cancelled = task.cancelling() if task else 0
+        try:
+            async with asyncio.timeout(HCI_TIMEOUT_S):
+                await command
+        except (TimeoutError, BaseBumbleError) as error:
+            raise LinkError(LinkFault.NO_ADAPTER, f"the bracelet's controller does not answer: {error!r}") from error
+        if task and task.cancelling() > cancelled:
+            # bumble waits with wait_for, which before Python 3.12 swallows a cancellation that comes with the answer.
+            raise asyncio.CancelledError
+
+    def _on_connection(self, link: Connection) -> None:
+        self._link = link
+        self._advertising = False  # a controller stops of itself when it is connected
+        self.links_made += 1
+        link.once(Connection.EVENT_DISCONNECTION, self._on_disconnection)
+        self._changed.set()
+
+    def _on_disconnection(self, _reason: int) -> None:
+        self._link = None
+        self._subscribed = False
+        self._changed.set()
+
+    def _on_subscription(self, _bearer: object, notify: bool, _indicate: bool) -> None:
+        self._subscribed = notify
+        if notify:
+            self._on_subscribed()
+
+    def _on_att(self, handle: int, pdu: bytes) -> None:
+        if not self.muted:
+            self.device.on_gatt_pdu(handle, pdu)
+
+
+def _services(bracelet: Bracelet, data: Characteristic[bytes], battery: Characteristic[bytes]) -> list[Service]:
+    def text(uuid: str, value: str) -> Characteristic[bytes]:
+        return _characteristic(uuid, _P.READ, value.encode)
+
+    return [
+        Service(
+            wire.SERVICE,
+            [
+                data,
+                _characteristic(wire.SCALE, _P.READ, bracelet.scale_value),
+                _characteristic(wire.RATE, _P.READ, bracelet.rate_value),
+                _characteristic(wire.BOOT, _P.READ, bracelet.boot_value),
+                _characteristic(wire.DEVICE_ID, _P.READ, bracelet.device_id_value),
+                _characteristic(wire.CLOCK, _P.READ, bracelet.clock_value),
+            ],
+        ),
+        Service("180F", [battery]),
+        Service(
+            "180A",
+            [
+                text(wire.MANUFACTURER_NAME, bracelet.manufacturer),
+                text(wire.MODEL_NUMBER, bracelet.model),
+                text(wire.FIRMWARE_REVISION, bracelet.firmware),
+            ],
+        ),
+    ]
+
+
+def _characteristic(uuid: str, properties: _P, value: Callable[[], bytes]) -> Characteristic[bytes]:
+    short = uuid[4:8] if uuid.endswith("-0000-1000-8000-00805f9b34fb") else uuid
+    permissions = Characteristic.READABLE if properties & _P.READ else Characteristic.Permissions(0)
+    return Characteristic(short, properties, permissions, CharacteristicValue(read=lambda _connection: value()))
