@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Page, Route, WebSocketRoute, expect
+from playwright.sync_api import ConsoleMessage, Page, Route, WebSocketRoute, expect
 
 import service.api
 from service.api.guard import CONTENT_SECURITY_POLICY
@@ -73,7 +73,7 @@ class ScriptedServer:
         self.connections = 0
         self.errors: list[str] = []
         self._socket: WebSocketRoute | None = None
-        page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
+        page.on("console", self._hear)
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.route(f"{ORIGIN}**", self._serve)
         page.route_web_socket("**/api/v1/live", self._accept)
@@ -94,6 +94,10 @@ class ScriptedServer:
         """Close the standing connection."""
         assert self._socket is not None
         self._socket.close(code=code)
+
+    def _hear(self, message: ConsoleMessage) -> None:
+        if message.type == "error":
+            self.errors.append(message.text)
 
     def _accept(self, socket: WebSocketRoute) -> None:
         self.connections += 1

@@ -106,6 +106,7 @@ export class Card {
   #numbers({ state, steps, steps_now, cadence_spm }) {
     const pending = Math.max(0, steps_now - steps);
     this.#text("steps-now", whole(steps_now));
+    this.element.style.setProperty("--chars", Math.max(2, whole(steps_now).length));
     this.#text("steps", whole(steps));
     this.#text("pending", `+${whole(pending)}`);
     this.#fields["pending-chip"].classList.toggle("none", pending === 0);

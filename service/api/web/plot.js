@@ -147,8 +147,9 @@ export class Plot {
     const marks = ticks(low, high);
     const digits = marks.length > 1 && marks[1] - marks[0] < 1 ? 1 : 0;
     for (const g of marks) {
-      this.#line(PAD.left, y(g), right, y(g));
-      c.fillText(g.toFixed(digits), PAD.left - 8, y(g));
+      const at = Math.round(y(g)) + 0.5;
+      this.#line(PAD.left, at, right, at);
+      c.fillText(g.toFixed(digits), PAD.left - 8, at);
     }
     c.textBaseline = "alphabetic";
     for (let s = WINDOW_S; s >= 0; s -= 2) {
