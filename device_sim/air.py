@@ -48,7 +48,6 @@ class LocalAir(Participants):
 
     def __init__(self) -> None:
         self.link = AirLink()
-        self._radios: set[Radio] = set()
 
     async def __aenter__(self) -> Self:
         return self
@@ -56,19 +55,21 @@ class LocalAir(Participants):
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for radio in list(self._radios):
+        for radio in self.link.radios():
             radio.leave()
 
     @asynccontextmanager
     async def attach(self, name: str) -> AsyncIterator[Transport]:
-        """Put a controller on the air and return its transport."""
-        radio = Radio(name, self.link)
-        self._radios.add(radio)
+        """Put a controller on the air and return its transport; it leaves on exit."""
+        radio = self.admit(name)
         try:
             yield Transport(radio, radio)
         finally:
             radio.leave()
-            self._radios.discard(radio)
+
+    def admit(self, name: str) -> Radio:
+        """Return a new radio on the air; whoever asked for it calls its `leave`."""
+        return Radio(name, self.link)
 
     def statistics(self) -> dict[str, int]:
         """Return how many radios and links there are."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from contextlib import AsyncExitStack, suppress
+from contextlib import AsyncExitStack
 from types import TracebackType
 from typing import Any, Final, Self, TypeVar
 
@@ -41,6 +41,7 @@ class Central:
         self._air = air
         self._name = name
         self._device: Device | None = None
+        self._lost: asyncio.Future[None] | None = None
         self._attachment = AsyncExitStack()
         self._opening = asyncio.Lock()
         self._connecting = asyncio.Lock()
@@ -56,6 +57,7 @@ class Central:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closed = True
+        self._listeners.clear()
         await self._close()
 
     def statistics(self) -> dict[str, int]:
@@ -66,9 +68,10 @@ class Central:
     async def device(self) -> Device:
         """Return the powered-on device; BleakBluetoothNotAvailableError (a BleakError) where there is no air."""
         async with self._opening:
-            if self._device is None:
+            if self._device is None or self._device_lost():
                 if self._closed:
                     raise _unavailable("this central was closed")
+                await self._close()  # what is left of an air that was lost
                 try:
                     self._device = await self._open()
                 except (LinkError, TimeoutError, BaseBumbleError, asyncio.InvalidStateError) as error:
@@ -90,7 +93,7 @@ class Central:
 
     async def disconnect(self, connection: Connection) -> None:
         """Ask for the end of a connection; its event tells when it has ended."""
-        if connection.device is not self._device:
+        if connection.device is not self._device or self._device_lost():
             return
         command = hci.HCI_Disconnect_Command(
             connection_handle=connection.handle, reason=hci.HCI_ErrorCode.REMOTE_USER_TERMINATED_CONNECTION_ERROR
@@ -98,14 +101,16 @@ class Central:
         await self._command(connection.device.send_async_command(command, check_status=False))
 
     async def listen(self, listener: Listener) -> None:
-        """Call `listener` with every advertisement from now on."""
+        """Call `listener` with every advertisement from now on; after the air was lost, once it is opened again."""
         async with self._scanning:
-            device = await self.device()
-            if not device.is_scanning:
-                # Active: the virtual controller reports every advertisement twice, and this merges the two.
-                await self._command(device.start_scanning(active=True, filter_duplicates=False))
-            device.on(Device.EVENT_ADVERTISEMENT, listener)
             self._listeners.append(listener)
+            try:
+                device = await self.device()
+                if not device.is_scanning:
+                    await self._command(_scan(device))
+            except BaseException:
+                self._listeners.remove(listener)
+                raise
 
     async def ignore(self, listener: Listener) -> None:
         """Call `listener` no more; the last one ends the scan."""
@@ -114,11 +119,7 @@ class Central:
         self._listeners.remove(listener)
         async with self._scanning:
             device = self._device
-            if device is None:
-                return
-            with suppress(KeyError):  # the air was lost meanwhile: this is another device
-                device.remove_listener(Device.EVENT_ADVERTISEMENT, listener)
-            if not self._listeners and device.is_scanning:
+            if device is not None and not self._device_lost() and not self._listeners and device.is_scanning:
                 await self._command(device.stop_scanning())
 
     async def _open(self) -> Device:
@@ -127,12 +128,22 @@ class Central:
         device = Device.with_hci(self._name, address, transport.source, transport.sink)
         async with asyncio.timeout(HCI_TIMEOUT_S):
             await device.power_on()
-        transport.source.terminated.add_done_callback(lambda _: self._forget(device))
+            if self._listeners:
+                await _scan(device)
+        device.on(Device.EVENT_ADVERTISEMENT, self._heard)
+        self._lost = transport.source.terminated
         return device
+
+    def _device_lost(self) -> bool:
+        return self._lost is not None and self._lost.done()
+
+    def _heard(self, advertisement: Advertisement) -> None:
+        for listener in tuple(self._listeners):
+            listener(advertisement)
 
     async def _close(self) -> None:
         """Give the controller back, which ends all links, and what still waits for it."""
-        device, self._device = self._device, None
+        self._device = self._lost = None
         attachment, self._attachment = self._attachment, AsyncExitStack()
         await attachment.aclose()
         pending = set(self._tasks)
@@ -140,14 +151,6 @@ class Central:
             for task in pending:
                 task.cancel()
             _, pending = await asyncio.wait(pending, timeout=CANCEL_TIMEOUT_S)
-        if device is not None:
-            self._listeners.clear()
-
-    def _forget(self, device: Device) -> None:
-        """Drop a device whose air was lost: bumble has ended its links already, the next use opens anew."""
-        if self._device is device:
-            self._device = None
-            self._listeners.clear()
 
     async def _command(self, command: Coroutine[Any, Any, T]) -> T:
         """Carry an HCI command through, whatever becomes of the caller; BleakError where it fails."""
@@ -191,6 +194,11 @@ def outcome(task: asyncio.Task[T]) -> T:
     if isinstance(error, BaseBumbleError):
         raise BleakError(f"{type(error).__name__}: {error}") from error
     raise error
+
+
+async def _scan(device: Device) -> None:
+    # Active: the virtual controller reports every advertisement twice, and this merges the two.
+    await device.start_scanning(active=True, filter_duplicates=False)
 
 
 def _unavailable(why: str) -> BleakBluetoothNotAvailableError:

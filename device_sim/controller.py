@@ -15,7 +15,7 @@ from bumble import core, hci, ll
 from bumble.controller import Connection, Controller
 from bumble.host import Host
 from bumble.link import LocalLink
-from bumble.transport.common import Transport
+from bumble.transport.common import Transport, TransportLostError
 
 ACL_BYTES = 251
 """Longest packet of Bluetooth 4.2 and later; with bumble's 27 everything takes two to four times as long."""
@@ -41,6 +41,10 @@ class AirLink(LocalLink):
     def on_address_changed(self, controller: Controller) -> None:
         """Note where a radio is found from now on."""
         self._by_address[controller.random_address] = controller
+
+    def radios(self) -> list[Radio]:
+        """Return everybody on the air."""
+        return [radio for radio in self.controllers if isinstance(radio, Radio)]
 
     def remove_controller(self, controller: Controller) -> None:
         """Take a radio off the air."""
@@ -79,6 +83,13 @@ class Radio(Controller):
         self.congested = False
         self._withheld: list[tuple[Radio, int]] = []
         self._left = False
+
+    def on_packet(self, packet: bytes) -> None:
+        """Take a packet from the host; once off the air a command fails here, instead of waiting for ever."""
+        if not self._left:
+            super().on_packet(packet)
+        elif packet[0] == hci.HCI_COMMAND_PACKET:
+            raise TransportLostError("the virtual air is gone")
 
     def on_hci_le_create_connection_cancel_command(
         self, _command: hci.HCI_LE_Create_Connection_Cancel_Command
@@ -126,7 +137,7 @@ class Radio(Controller):
         else:
             super().on_hci_acl_data_packet(packet)
 
-    def set_congested(self, congested: bool) -> None:
+    def set_congested(self, *, congested: bool) -> None:
         """Say whether this radio's host is behind; release what was withheld from its peers when it is not."""
         self.congested = congested
         if congested:
@@ -149,11 +160,11 @@ class Radio(Controller):
                 connection.send_ll_control_pdu(ll.TerminateInd(hci.HCI_ErrorCode.CONNECTION_TIMEOUT_ERROR))
         self.le_connections.clear()
         self.air.remove_controller(self)
-        self.set_congested(False)
-        host, self.host = self.host, None
-        report_loss(host)
+        self.set_congested(congested=False)
         if not self.terminated.done():
             self.terminated.set_result(None)
+        host, self.host = self.host, None
+        report_loss(host)
 
     def _confirm(self, connection: Connection) -> None:
         peer = self.air.find_le_controller(connection.peer_address)

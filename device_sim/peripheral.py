@@ -117,6 +117,8 @@ class Peripheral:
         self._lost.add_done_callback(lambda _: self._changed.set())
         await self._hci(self.device.power_on())
         await self.settle()
+        if self._lost.done():
+            raise LinkError(LinkFault.NO_ADAPTER, "the air was lost at once: has it too many participants?")
 
     async def serve(self) -> None:
         """Advertise whenever there is no link, until the air is lost."""
@@ -177,6 +179,8 @@ class Peripheral:
             async with asyncio.timeout(HCI_TIMEOUT_S):
                 await command
         except (TimeoutError, BaseBumbleError) as error:
+            if self._lost.done():
+                return  # `serve` ends by itself
             raise LinkError(LinkFault.NO_ADAPTER, f"the bracelet's controller does not answer: {error!r}") from error
         if task and task.cancelling() > cancelled:
             # bumble waits with wait_for, which before Python 3.12 swallows a cancellation that comes with the answer.
