@@ -36,8 +36,9 @@ class Walker:
     """Acceleration in g (n×3, gravity included) of somebody who follows `schedule`; a `device_sim.source.Source`.
 
     `gravity` is the direction, in the sensor's axes, of what it reads while the arm hangs still. `strength` scales
-    the impacts, `arm_m` is the length from shoulder to sensor, `noise_g` the sensor's white noise. With `loop` the
-    schedule begins again for ever, with other variations. ParameterError where a value is out of range.
+    the impacts and their roughness, `arm_m` is the length from shoulder to sensor, `noise_g` the sensor's white
+    noise. With `loop` the schedule begins again for ever, with other variations. ParameterError where a value is
+    out of range.
     """
 
     def __init__(

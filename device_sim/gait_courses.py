@@ -24,8 +24,8 @@ _DIFFERENCE_S: Final = 0.005
 """Step of the central differences that give the arm's angular rate and acceleration."""
 _SD_LIMIT: Final = 2.5
 """Variations beyond this many standard deviations are cut: an interval must stay positive."""
-_SETTING_OUT: Final = 0.5
-"""Share of the full arm swing at a segment's first and last step; ours."""
+_SWING_GAIN: Final = 0.5
+"""Share of the full arm swing gained with each step after a segment's first, and lost before its last; ours."""
 _KNOCKS_HZ: Final = 3.0
 _KNOCK_GROUP: Final = (3, 5)
 """Three knocks, then a pause of two."""
@@ -65,13 +65,13 @@ def _gait_course(segment: Segment, start_s: float, wearer: Wearer, rng: np.rando
     phase = np.concatenate(([-0.5], np.arange(count), [count - 0.5]))
     foot = np.where(np.arange(count) % 2, -1.0, 1.0) * gait.asymmetry
     strength = np.pad(wearer.strength * (1 + foot) * (1 + gait.strength_sd * _normal(rng, count)), 1)
-    swing = np.pad(np.ones(count), 1)
-    swing[[1, -2]] = _SETTING_OUT
+    from_an_end = np.minimum(np.arange(count), np.arange(count)[::-1])
+    swing = np.pad(np.minimum(_SWING_GAIN * from_an_end, 1.0), 1)
 
     def arm_g(t_s: Floats) -> Floats:
         return _walking(t_s, knots_s, phase, strength, swing, gait, wearer)
 
-    return Course(step_t_s=knots_s[1:-1], rough_g=gait.rough_g, arm_g=arm_g)
+    return Course(step_t_s=knots_s[1:-1], rough_g=gait.rough_g * wearer.strength, arm_g=arm_g)
 
 
 def _knots(duration_s: float, count: int, interval_sd: float, rng: np.random.Generator) -> Floats:
