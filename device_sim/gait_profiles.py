@@ -238,7 +238,7 @@ MOTIONS: Final[dict[str, Motion]] = {
         turn_s=1.0,
         turn_every_s=10,
         rough_g=0.016,
-        measured="negatives_banglejs/work57min: per 10 s a turn of 14° and norm's sd 0.016 g; 12.5 Hz hide single keys",
+        measured="negatives_banglejs, work57min: in 10 s a turn of 14° and norm's sd 0.016 g; 12.5 Hz hides the keys",
     ),
     "knock": Motion(
         knock_g=1.0,
