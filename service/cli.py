@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 USAGE_ERROR = 2
 NO_BLUETOOTH = 3
 DEFAULT_AIR = "127.0.0.1:7400"
-DEMO_WALK = "normal:30,slow:20,rest:6,typing:8,fast:20,run:15,rest:5"
+DEMO_WALK = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
 
 Command = Callable[[argparse.Namespace], Coroutine[Any, Any, None]]
 

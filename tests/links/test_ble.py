@@ -1,0 +1,163 @@
+"""A link is one connection: packets in order, losses told by reason, and no wait without an end."""
+
+import asyncio
+import contextlib
+import math
+import time
+
+import pytest
+
+from device_sim.air import LocalAir
+from device_sim.bracelet import Bracelet
+from device_sim.gait import Walker
+from device_sim.gatt import Start
+from service.errors import LinkError, LinkFault
+from service.links import ble
+from service.links.ble import Backend, BleLink, find
+from service.wearables import bracelet as wire
+from service.wearables.contract import Read, Write
+
+
+@contextlib.asynccontextmanager
+async def on_air(seconds=60, **radio):
+    async with LocalAir() as air:
+        bracelet = Bracelet(Walker(f"normal:{seconds}", seed=1))
+        async with air.bracelet(bracelet, **radio) as gatt, air.central() as central:
+            backend = Backend(scanner=central.scanner, client=central.client)
+            (sighting,) = await find(wire.Bracelet.services, for_s=0.3, backend=backend)
+            yield gatt, sighting, backend
+
+
+def link_to(sighting, backend, handshake=None):
+    return BleLink(sighting.handle, handshake or wire.Bracelet().handshake(), backend)
+
+
+async def take(link, n):
+    packets = []
+    async with asyncio.timeout(5):
+        async for packet in link:
+            packets.append(packet)
+            if len(packets) == n:
+                return packets
+    return packets
+
+
+async def test_find_tells_name_address_and_signal():
+    async with on_air(name="Wrist") as (_, sighting, _):
+        assert sighting.name == "Wrist"
+        assert wire.SERVICE in sighting.services
+        assert -100 <= sighting.rssi_dbm <= 0
+
+
+async def test_what_was_read_comes_first_then_data_in_order():
+    async with (
+        on_air(speed=20, start=Start.ON_SUBSCRIBE) as (_, sighting, backend),
+        link_to(sighting, backend) as link,
+    ):
+        before = time.time_ns()
+        packets = await take(link, 60)
+        assert link.diagnostics()["connected"]
+    kinds = [packet.characteristic for packet in packets]
+    assert kinds[:5] == [wire.DEVICE_ID, wire.BOOT, wire.SCALE, wire.RATE, wire.CLOCK]
+    decoder = wire.Bracelet()
+    blocks = [decoder.feed(packet.characteristic, packet.data) for packet in packets]
+    indices = [block.index for packet, block in zip(packets, blocks, strict=True) if packet.characteristic == wire.DATA]
+    assert indices == list(range(0, 10 * len(indices), 10))
+    assert all(abs(packet.at_ns - before) < 60e9 for packet in packets)
+
+
+async def test_a_lost_link_says_so_and_what_had_arrived_comes_first():
+    async with on_air(speed=20) as (gatt, sighting, backend), link_to(sighting, backend) as link:
+        await take(link, 20)
+        await gatt.drop_link()
+        with pytest.raises(LinkError) as lost:
+            await take(link, 10_000)
+        assert lost.value.reason is LinkFault.LOST
+        with pytest.raises(LinkError):
+            await take(link, 1)
+
+
+async def test_a_silent_link_is_dropped(monkeypatch):
+    monkeypatch.setattr(ble, "SILENCE_S", 0.2)
+    async with on_air() as (gatt, sighting, backend), link_to(sighting, backend) as link:
+        await take(link, 12)
+        gatt.silence()
+        with pytest.raises(LinkError) as silent:
+            await take(link, 10_000)
+        assert silent.value.reason is LinkFault.SILENT
+
+
+async def test_a_device_that_answers_nothing_is_bounded(monkeypatch):
+    monkeypatch.setattr(ble, "CONNECT_TIMEOUT_S", 0.4)
+    async with on_air() as (gatt, sighting, backend):
+        await gatt.go_away()
+        began = time.monotonic()
+        with pytest.raises(LinkError) as failed:
+            async with link_to(sighting, backend):
+                pass
+        assert failed.value.reason in {LinkFault.TIMEOUT, LinkFault.REFUSED}
+        assert time.monotonic() - began < 3
+        await gatt.come_back()
+        monkeypatch.setattr(ble, "CONNECT_TIMEOUT_S", 5.0)
+        async with link_to(sighting, backend) as link:
+            assert await take(link, 10)
+
+
+async def test_cancelling_a_connect_returns_at_once():
+    async with on_air() as (gatt, sighting, backend):
+        await gatt.go_away()
+        task = asyncio.create_task(link_to(sighting, backend).__aenter__())
+        await asyncio.sleep(0.1)
+        began = time.monotonic()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert time.monotonic() - began < 0.1
+
+
+async def test_a_device_without_our_characteristic_is_not_ours():
+    async with on_air() as (_, sighting, backend):
+        wanted = [Read(characteristic="5e9a00ff-4b1d-4c0e-8f3a-73746570b001")]
+        with pytest.raises(LinkError) as refused:
+            async with link_to(sighting, backend, wanted):
+                pass
+        assert refused.value.reason is LinkFault.NOT_OURS
+
+
+async def test_an_optional_characteristic_may_be_missing():
+    async with on_air() as (_, sighting, backend):
+        optional = Read(characteristic="5e9a00ff-4b1d-4c0e-8f3a-73746570b001", optional=True)
+        async with link_to(sighting, backend, [optional, Read(characteristic=wire.RATE)]) as link:
+            (packet,) = await take(link, 1)
+            assert packet.characteristic == wire.RATE
+
+
+async def test_a_write_to_what_is_not_there_is_a_link_error():
+    async with on_air() as (_, sighting, backend), link_to(sighting, backend) as link:
+        with pytest.raises(LinkError) as refused:
+            await link.request(Write(characteristic="5e9a00ff-4b1d-4c0e-8f3a-73746570b001", data=b"\0"))
+        assert refused.value.reason is LinkFault.NOT_OURS
+
+
+async def test_a_closed_link_takes_no_requests():
+    async with on_air() as (_, sighting, backend):
+        async with link_to(sighting, backend) as link:
+            pass
+        with pytest.raises(LinkError) as refused:
+            await link.request(Write(characteristic=wire.RATE, data=b"\0"))
+        assert refused.value.reason is LinkFault.LOST
+
+
+async def test_after_each_of_ten_reconnects_a_notification_comes_once():
+    async with on_air(seconds=600, speed=math.inf, start=Start.ON_SUBSCRIBE) as (_, sighting, backend):
+        for _ in range(10):
+            async with link_to(sighting, backend) as link:
+                packets = [packet.data for packet in await take(link, 40) if packet.characteristic == wire.DATA]
+                assert len(set(packets)) == len(packets)
+
+
+async def test_no_bluetooth_is_told_with_advice(monkeypatch):
+    monkeypatch.setenv("DBUS_SYSTEM_BUS_ADDRESS", "unix:path=/nonexistent")
+    with pytest.raises(LinkError, match="steplink demo") as failed:
+        await find(wire.Bracelet.services, for_s=0.1)
+    assert failed.value.reason is LinkFault.NO_ADAPTER
