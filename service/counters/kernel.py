@@ -148,9 +148,7 @@ def end(s: State, out: State) -> int:
     rows = 0
     if s[NEXT] > s[WINDOW_FROM]:
         rows = _close(s, s[NEXT] - 1.0, out, rows)
-    rows = _settle(s, s[NEXT] + s[WAIT] + 1.0, out, rows)
-    s[COUNT] = 0.0
-    return rows
+    return _settle(s, s[NEXT] + s[WAIT] + 1.0, out, rows)
 
 
 def pending(s: State) -> int:

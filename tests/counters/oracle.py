@@ -35,8 +35,8 @@ def extrema(x, half):
     return found
 
 
-def thresholds(found, samples, length):
-    """(9) to (16): T_H and T_L of each window of fixed length, None before both means exist."""
+def thresholds(found, samples, length, share=0.0):
+    """(9) to (16): T_H and T_L = L + share (H − L) of each window of fixed length, None before both means exist."""
     high = low = None
     result = []
     for start in range(0, samples, length):
@@ -48,15 +48,15 @@ def thresholds(found, samples, length):
                 continue
             mean = (known + values[0]) / 2.0 if len(values) == 1 and known is not None else np.mean(values)
             high, low = (mean, low) if peak else (high, mean)
-        result.append(None if high is None or low is None else ((high + low) / 2.0, low))
+        result.append(None if high is None or low is None else ((high + low) / 2.0, low + share * (high - low)))
     return result
 
 
-def valid_peaks(magnitude, *, half, length, valleys, wait, low, high):
+def valid_peaks(magnitude, *, half, length, valleys, wait, low, high, share):
     """Return the indices of valid peaks and, apart, of the steps: valid peaks that are no reference."""
     x = smooth(magnitude)
     found = extrema(x, half)
-    windows = thresholds(found, len(x), length)
+    windows = thresholds(found, len(x), length, share)
     valid, steps = [], []
     for e in found:
         bounds = windows[e.at // length]

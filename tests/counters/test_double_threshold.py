@@ -63,8 +63,9 @@ def bumpy(samples, step_hz=2.0, swing_g=0.6):
     wait=st.integers(10, 120),
     low=st.integers(5, 20),
     high=st.integers(30, 250),
+    share=st.sampled_from([0.0, 0.4, 0.9]),
 )
-def test_agrees_with_the_text(signal, half, length, valleys, wait, low, high):
+def test_agrees_with_the_text(signal, half, length, valleys, wait, low, high, share):
     params = replace(
         PLAIN,
         half_width=half,
@@ -73,11 +74,12 @@ def test_agrees_with_the_text(signal, half, length, valleys, wait, low, high):
         valley_wait=wait,
         min_spacing=low,
         max_spacing=high,
+        lower_share=share,
     )
     magnitude = np.sqrt(signal.values[:, 0] ** 2 + signal.values[:, 1] ** 2 + signal.values[:, 2] ** 2)
     magnitude = magnitude + 1e-9 * np.arange(len(signal)) % 7  # no ties that rounding could break either way
     valid, steps = oracle.valid_peaks(
-        magnitude, half=half, length=length, valleys=valleys, wait=wait, low=low, high=high
+        magnitude, half=half, length=length, valleys=valleys, wait=wait, low=low, high=high, share=share
     )
     assert peaks_of(steps_of(params, magnitude)) == steps
     everything = steps_of(replace(params, credit="retrospective"), magnitude)
@@ -148,6 +150,29 @@ def test_peaks_too_near_are_one_step():
     assert spacing.min() > 10
 
 
+@pytest.mark.parametrize(("max_spacing", "counted"), [(50, False), (51, True)])
+def test_a_spacing_of_the_maximum_is_a_new_reference(max_spacing, counted):
+    signal = Signal(walk(2000, 1.0, 0.3))
+    assert bool(step_rows(signal.block(), replace(TUNED, max_spacing=max_spacing)).size) is counted
+
+
+def test_nothing_counts_before_both_means_exist():
+    one_peak_then_valleys = np.concatenate([np.linspace(1.0, 2.0, 15), np.linspace(2.0, 0.5, 40), bumpy(200)])
+    params = replace(PLAIN, first_window=30, lower_share=0.9, credit="retrospective")
+    update = DoubleThreshold(params).update(block_of(one_peak_then_valleys))
+    assert update.bands[0].from_s >= 28 / GRID_HZ
+    assert min(step.at_s for step in update.steps) >= update.bands[0].from_s
+
+
+def test_a_peak_waits_for_its_valley_as_long_as_it_may_and_no_longer():
+    counter = DoubleThreshold(replace(PLAIN, valley_wait=100))
+    counter.update(block_of(bumpy(585)))
+    ramp = np.linspace(1.5, 0.1, 200)
+    pending = [counter.update(block_of(ramp[k : k + 1], start=585 + k)).pending for k in range(len(ramp))]
+    assert pending[90] == 1
+    assert pending[100 + 30 + 10] == 0
+
+
 @pytest.mark.parametrize(("swing_g", "moves"), [(0.014, False), (0.03, True)])
 def test_less_than_one_raw_unit_is_rest(swing_g, moves):
     assert bool(steps_of(PAPER, bumpy(600, swing_g=swing_g))) is moves
@@ -169,7 +194,7 @@ def test_a_crest_of_two_equal_samples_is_a_peak_only_where_ties_go_on():
     assert counted["break"] < 30
 
 
-@pytest.mark.parametrize("step_hz", [1.25, 2.0, 2.5])
+@pytest.mark.parametrize("step_hz", [1.25, 2.0, 2.3])
 def test_window_becomes_the_mean_spacing_of_steps(step_hz):
     counter = DoubleThreshold(replace(TUNED, first_window=40))
     counter.update(block_of(bumpy(1500, step_hz)))
