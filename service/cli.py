@@ -10,6 +10,7 @@ import argparse
 import asyncio
 import contextlib
 import dataclasses
+import logging
 import math
 import signal
 import sys
@@ -37,6 +38,7 @@ Command = Callable[[argparse.Namespace], Coroutine[Any, Any, None]]
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     options = _parser().parse_args(argv)
+    logging.basicConfig(level=logging.WARNING, format="steplink: %(message)s")
     try:
         asyncio.run(_stoppable(options.command(options)))
     except (KeyboardInterrupt, asyncio.CancelledError):

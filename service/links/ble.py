@@ -37,10 +37,10 @@ SILENCE_S = 5.0
 QUEUE_PACKETS = 4096
 """Packets that may wait: 13 min at five a second. Policy: the newest is dropped, which shows as a gap."""
 
-_ADVICE = {
-    LinkFault.NO_ADAPTER: ". No usable Bluetooth: is an adapter plugged in and switched on, and does bluetoothd run"
-    " (Linux)? `steplink demo` needs none."
-}
+_ADVICE = (
+    ". No usable Bluetooth: is an adapter plugged in and switched on, and does bluetoothd run (Linux)?"
+    " `steplink demo` needs none."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +49,8 @@ class Backend:
 
     scanner: type[BaseBleakScanner] | None = None
     client: type[BaseBleakClient] | None = None
+    advice: str = ""
+    """Said to whoever has no adapter."""
 
     @property
     def options(self) -> dict[str, Any]:
@@ -61,7 +63,7 @@ class Backend:
         return {"backend": self.client} if self.client else {}
 
 
-PLATFORM = Backend()
+PLATFORM = Backend(advice=_ADVICE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +98,7 @@ async def scanning(services: Sequence[str], backend: Backend = PLATFORM) -> Asyn
             yield await heard.get()
 
     scanner = BleakScanner(hear, service_uuids=list(services), **backend.options)
-    with _translated("scan", LinkFault.NO_ADAPTER):
+    with _translated("scan", LinkFault.NO_ADAPTER, backend.advice):
         async with asyncio.timeout(CONNECT_TIMEOUT_S):
             await scanner.start()
     try:
@@ -243,18 +245,15 @@ class BleLink:
 
 
 @contextlib.contextmanager
-def _translated(what: str, otherwise: LinkFault = LinkFault.REFUSED) -> Iterator[None]:
+def _translated(what: str, otherwise: LinkFault = LinkFault.REFUSED, advice: str = "") -> Iterator[None]:
     """Turn what bleak and the platform raise into a LinkError with a reason."""
     try:
         yield
     except LinkError:
         raise
     except BleakBluetoothNotAvailableError as error:
-        fault = LinkFault.NO_ADAPTER
-        raise LinkError(fault, f"{what}: {error}{_ADVICE[fault]}") from error
+        raise LinkError(LinkFault.NO_ADAPTER, f"{what}: {error.args[0]}{advice}") from error
     except TimeoutError as error:
         raise LinkError(LinkFault.TIMEOUT, f"{what}: no answer in time") from error
     except (BleakError, OSError, EOFError) as error:
-        raise LinkError(
-            otherwise, f"{what}: {str(error) or type(error).__name__}{_ADVICE.get(otherwise, '')}"
-        ) from error
+        raise LinkError(otherwise, f"{what}: {str(error) or type(error).__name__}{advice}") from error

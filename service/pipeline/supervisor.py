@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import random
 from collections.abc import AsyncIterator, Callable, Collection
 
@@ -26,6 +27,8 @@ SCAN_STRETCH_S = 10.0
 """A scan is begun anew so often: a radio that went away and came back is noticed by that."""
 SEEN_EVERY_S = 5.0
 """A device that is heard but not connected is told of at most so often."""
+
+logger = logging.getLogger(__name__)
 
 TrackerFactory = Callable[[Wearable], Tracker]
 
@@ -99,6 +102,8 @@ class Supervisor:
             try:
                 due = await self._hear_one_due()
             except LinkError as error:
+                if self.trouble is None or self.trouble.why != error.why:
+                    logger.warning("nothing can be heard for now, trying again: %s", error.why)
                 self.trouble = error
                 await asyncio.sleep(SCANNER_RETRY_S)
                 continue
