@@ -47,8 +47,8 @@ On the dev recordings, mean absolute percentage error and false steps an hour; `
 So rest at 0.18 g rejects most false steps; T_L above L finds the steps it costs (a valley alone in its window passes
 T_L = L only if it lies below the mean before); bouts of five reject short gestures, and walks of four steps with them.
 `ties` changes no figure, but a perfectly even walk of 50 samples a step has crests of two equal samples. A check of the
-rhythm was tried near these values and left out: at ±50 % hmp fell from 1238 to 1028 and pebble's error rose from 3.7 to
-8.3. All values were chosen on these recordings, so expect less of others.
+rhythm was tried near these values and left out: from ±100 % to ±50 % hmp fell from 1238 to 1028 and pebble's error rose
+from 3.7 to 8.3. All values were chosen on these recordings, so expect less of others.
 """
 
 from __future__ import annotations
