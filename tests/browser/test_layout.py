@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 SIZES = {"phone": (390, 844), "narrow": (320, 640), "desktop": (1440, 900)}
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.full)])
 @pytest.mark.parametrize("size", list(SIZES))
 def test_nothing_scrolls_sideways(scripted: Scripted, size: str, scheme: str) -> None:
     width, height = SIZES[size]

@@ -73,6 +73,17 @@ def test_battery_packets_and_losses_are_told(scripted: Scripted) -> None:
     }  # fmt: skip
 
 
+def test_tallies_are_kept_up_to_date_and_counts_stay_the_feeds(scripted: Scripted) -> None:
+    server = scripted(device(packets=10))
+    page = server.open()
+    server.send(counting(50, 51))
+    server.devices = [device(packets=20, samples_lost=300, steps=45, steps_now=45, state="lost")]
+    expect(field(page, "packets")).to_have_text("20")
+    expect(field(page, "lost-more")).to_have_text("300 of 10,200")
+    expect(field(page, "steps-now")).to_have_text("51")
+    expect(field(page, "state")).to_have_text("Live")
+
+
 def test_unknown_values_are_dashes(scripted: Scripted) -> None:
     page = scripted(device(rate_hz=None, measured_rate_hz=None, rssi_dbm=None, battery_percent=None, cadence_spm=None,
                            samples=0, samples_lost=0, session_since=None)).open()  # fmt: skip

@@ -13,6 +13,7 @@ import { duration, localTime, whole, zone } from "./format.js";
 const ANNOUNCE_MS = 10_000;
 const SECOND_MS = 1_000;
 const HEALTH_MS = 5_000;
+const TALLIES_MS = 2_000;
 
 const $ = (id) => document.getElementById(id);
 const devices = new Devices();
@@ -94,10 +95,24 @@ function showDevices() {
   document.title = entries.length === 1 ? `${whole(entries[0].device.steps_now)} steps · steplink` : "steplink";
 }
 
+async function got(path) {
+  try {
+    return await (await fetch(new URL(path, document.baseURI), { signal: AbortSignal.timeout(TALLIES_MS) })).json();
+  } catch {
+    return null;
+  }
+}
+
+async function refreshTallies() {
+  if (server.state !== "open" || document.hidden || devices.all.length === 0) return;
+  devices.refresh((await got("api/v1/devices"))?.items ?? []);
+  dirty = true;
+}
+
 /** While there is no bracelet, say whether the server's Bluetooth is the reason. */
 async function showTrouble() {
   if ($("empty").hidden || server.state !== "open") return;
-  const health = await fetch(new URL("healthz", document.baseURI)).then((answer) => answer.json()).catch(() => null);
+  const health = await got("healthz");
   $("trouble").hidden = !health?.reason;
   setText("trouble", health?.reason ? `Bluetooth does not work on the server: ${health.reason}` : "");
 }
@@ -141,5 +156,6 @@ setInterval(() => {
   showServer();
 }, SECOND_MS);
 setInterval(showTrouble, HEALTH_MS);
+setInterval(refreshTallies, TALLIES_MS);
 feed.connect();
 requestAnimationFrame(frame);

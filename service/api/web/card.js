@@ -67,8 +67,8 @@ export class Card {
     const { manufacturer, model, firmware, id } = device;
     const name = device.name || model || id;
     this.#text("name", name);
-    const made = [manufacturer, model, firmware && `firmware ${firmware}`].filter(Boolean).join(" ");
-    this.#text("model", made ? `${made} · ${id}` : id);
+    const made = [manufacturer, model].filter(Boolean).join(" ");
+    this.#text("model", [made, firmware && `firmware ${firmware}`, id].filter(Boolean).join(" · "));
     this.#text("notice", this.#error ?? notice(device, now));
     this.#fields.notice.hidden = !this.#fields.notice.textContent;
     this.#fields.canvas.setAttribute("aria-label", `The last ten seconds of ${name}: filtered acceleration in g, `
