@@ -131,7 +131,7 @@ class BleLink:
         self._packets: asyncio.Queue[Packet] = asyncio.Queue(QUEUE_PACKETS)
         self._arrived = asyncio.Event()
         """Set while packets wait, and for good once the link is lost."""
-        self._lost = False
+        self._entered = self._lost = False
         self._dropped = 0
 
     def diagnostics(self) -> dict[str, object]:
@@ -147,6 +147,9 @@ class BleLink:
 
     async def __aenter__(self) -> Self:
         """Connect and do the handshake; LinkError says why it failed."""
+        if self._entered:
+            raise RuntimeError("a link is one connection: make a new one")
+        self._entered = True
         try:
             with _translated(f"connect to {self._handle.address}"):
                 await self._open()

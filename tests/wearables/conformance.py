@@ -1,0 +1,87 @@
+"""What every wearable's protocol is held to. A new one is a line in WEARABLES and runs through all of it."""
+
+import uuid
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from service.errors import WireError
+from service.samples import DeviceInfo, RawBlock
+from service.wearables import bracelet
+from service.wearables.contract import Read, Subscribe, Wearable, Write
+
+FOREIGN = "00002a99-0000-1000-8000-00805f9b34fb"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A wearable, the values a host has read before data comes, and one good value of data."""
+
+    make: Callable[[], Wearable]
+    said: dict[str, bytes]
+    data: tuple[str, bytes]
+
+
+WEARABLES = {
+    "bracelet": Case(
+        make=bracelet.Bracelet,
+        said={bracelet.SCALE: bracelet.encode_scale(4096), bracelet.BOOT: bracelet.encode_boot(7)},
+        data=(
+            bracelet.DATA,
+            bracelet.encode(bracelet.DataPacket(boot=7, index=128, tick=99, counts=[(1, 2, 3), (4, 5, 6)])),
+        ),
+    )
+}
+
+
+def ready(case):
+    wearable = case.make()
+    for characteristic, data in case.said.items():
+        wearable.feed(characteristic, data)
+    return wearable
+
+
+def check_services(case):
+    """A scan compares strings: so they are 128-bit UUIDs in lower case."""
+    services = case.make().services
+    assert services
+    assert all(str(uuid.UUID(service)) == service for service in services)
+
+
+def check_handshake(case):
+    """Reads before subscriptions, so that no packet comes before its scale; always the same."""
+    actions = case.make().handshake()
+    assert list(actions) == list(case.make().handshake())
+    assert all(isinstance(action, Read | Subscribe | Write) for action in actions)
+    needed = [isinstance(action, Subscribe) for action in actions]
+    assert any(needed)
+    assert sorted(needed) == needed
+
+
+def check_data(case):
+    """A good value gives samples whose columns are equally long."""
+    block = ready(case).feed(*case.data)
+    assert isinstance(block, RawBlock)
+    assert len({len(column) for column in block.acc_g}) == 1
+    assert len(block) > 0
+
+
+def check_foreign(case):
+    """A characteristic that is not its own holds nothing for us."""
+    assert ready(case).feed(FOREIGN, b"anything") is None
+
+
+def check_any_bytes(case, characteristic, data):
+    """Any bytes give samples, a description, nothing, or a WireError; and leave the decoder as good as before."""
+    wearable = ready(case)
+    try:
+        said = wearable.feed(characteristic, data)
+        assert said is None or isinstance(said, RawBlock | DeviceInfo)
+    except WireError as error:
+        assert error.why
+    if characteristic == case.data[0]:
+        assert wearable.feed(*case.data) == ready(case).feed(*case.data)
+
+
+def check_history(case):
+    """Asking for samples again is a list of writes, perhaps an empty one."""
+    assert all(isinstance(write, Write) for write in ready(case).history(0, 1000))
