@@ -27,6 +27,7 @@ from bumble.gatt_client import CharacteristicProxy, ServiceProxy
 
 from device_sim.bleak_scanner import uuid_text
 from device_sim.central import Central, outcome
+from device_sim.operations import Operations
 
 MTU: Final = 517
 """What is asked for; the peripheral may agree to less."""
@@ -54,7 +55,7 @@ class _Link:
     """One connection: what waits on it, and whether it has ended."""
 
     connection: Connection
-    requests: set[asyncio.Task[Any]] = field(default_factory=set)
+    requests: Operations = field(default_factory=lambda: Operations("link"))
     subscriptions: dict[int, Callable[[bytes], None]] = field(default_factory=dict)
     established: bool = False
     ended: asyncio.Event = field(default_factory=asyncio.Event)
@@ -99,13 +100,16 @@ class BumbleClient(BaseBleakClient):
         return self._link is not None and self._link.established
 
     async def connect(self, pair: bool, *, timeout: float | None = None, **_kwargs: object) -> None:  # noqa: ASYNC109
-        """Find (where only an address is known), connect, agree on an MTU, discover; TimeoutError after `timeout`."""
+        """Connect, agree on an MTU and discover; TimeoutError after `timeout` seconds.
+
+        Where only an address is known it is looked for first, for as long; BleakDeviceNotFoundError where it is silent.
+        """
         if self._link is not None:
             raise BleakError("Client is already connected")
         timeout_s = self._timeout if timeout is None else timeout
+        if self._target is None:
+            self._target = await self._find(timeout_s)
         async with asyncio.timeout(timeout_s):
-            if self._target is None:
-                self._target = await self._find(timeout_s)
             link = self._adopt(await self.central.connect(self._target))
             try:
                 if pair:
@@ -196,8 +200,7 @@ class BumbleClient(BaseBleakClient):
 
         await self.central.listen(heard)
         try:
-            # Less than the whole, so that it is this error that is raised.
-            async with asyncio.timeout(0.9 * timeout_s):
+            async with asyncio.timeout(timeout_s):
                 return await found
         except TimeoutError:
             raise BleakDeviceNotFoundError(self.address, f"{self.address} was not found: it is silent") from None
@@ -205,6 +208,9 @@ class BumbleClient(BaseBleakClient):
             await self.central.ignore(heard)
 
     def _adopt(self, connection: Connection) -> _Link:
+        if connection.device.connections.get(connection.handle) is not connection:
+            # Its end was told before anybody could listen.
+            raise BleakError(f"{self.address} did not take the connection")
         link = self._link = _Link(connection)
         connection.once(Connection.EVENT_DISCONNECTION, lambda _reason: self._on_disconnection(link))
         return link
@@ -213,8 +219,7 @@ class BumbleClient(BaseBleakClient):
         if link.ended.is_set():
             return
         link.ended.set()
-        for request in link.requests:
-            request.cancel()  # those that wait for another's answer would wait for ever
+        link.requests.cancel()  # those that wait for another's answer would wait for ever
         if self._link is link:
             self._link = None
             self.services = None
@@ -236,18 +241,15 @@ class BumbleClient(BaseBleakClient):
         await self._ask(lambda: gatt.write_value(handle, data, with_response=response))
 
     async def _ask(self, request: Callable[[], Coroutine[Any, Any, T]]) -> T:
-        """Carry an ATT transaction through: one that were given up would leave its answer to the next."""
+        """Carry an ATT transaction through; BleakError where it fails or the link drops."""
         link = self._up()
         if link.ended.is_set():
             raise BleakError("disconnected")
-        task = asyncio.create_task(request(), name=f"{self.address} request")
-        link.requests.add(task)
-        task.add_done_callback(link.requests.discard)
-        done, _ = await asyncio.wait({task}, timeout=ATT_TIMEOUT_S)
-        if not done:
+        try:
+            return outcome(await link.requests.run(request(), ATT_TIMEOUT_S))
+        except TimeoutError as error:
             await self.disconnect()
-            raise BleakError(f"no answer from {self.address} in {ATT_TIMEOUT_S:g} s: disconnected")
-        return outcome(task)
+            raise BleakError(f"no answer from {self.address}: disconnected") from error
 
 
 async def _discover(connection: Connection, wanted: set[str] | None) -> BleakGATTServiceCollection:

@@ -1,7 +1,6 @@
 """The host's side of an air: one bumble device, opened when it is first needed and again after the air was lost.
 
-Every HCI command runs in a task of its own that is never cancelled half-way: bumble gives a late answer to whichever
-command comes next. A caller that is cancelled leaves its command to finish; the central owns the task.
+Every HCI command is carried through (`device_sim.operations`); the central owns those that are unfinished.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from bumble.core import BaseBumbleError
 from bumble.device import Advertisement, Connection, Device
 
 from device_sim.controller import Air
+from device_sim.operations import Operations
 from service.errors import LinkError
 
 HCI_TIMEOUT_S: Final = 5.0
@@ -47,7 +47,7 @@ class Central:
         self._connecting = asyncio.Lock()
         self._scanning = asyncio.Lock()
         self._listeners: list[Listener] = []
-        self._tasks: set[asyncio.Task[Any]] = set()
+        self._operations = Operations(name)
         self._closed = False
 
     async def __aenter__(self) -> Self:
@@ -63,7 +63,7 @@ class Central:
     def statistics(self) -> dict[str, int]:
         """Return how many scanners, links and unfinished operations there are."""
         links = 0 if self._device is None else len(self._device.connections)
-        return {"scanners": len(self._listeners), "links": links, "operations": len(self._tasks)}
+        return {"scanners": len(self._listeners), "links": links, "operations": len(self._operations)}
 
     async def device(self) -> Device:
         """Return the powered-on device; BleakBluetoothNotAvailableError (a BleakError) where there is no air."""
@@ -83,7 +83,7 @@ class Central:
         """Connect, waiting for ever; when cancelled, the controller's attempt is cancelled too."""
         async with self._connecting:  # a controller makes one connection at a time
             device = await self.device()
-            attempt = self._spawn(device.connect(address, timeout=None))
+            attempt = self._operations.spawn(device.connect(address, timeout=None))
             try:
                 await asyncio.wait({attempt})
             finally:
@@ -143,43 +143,29 @@ class Central:
 
     async def _close(self) -> None:
         """Give the controller back, which ends all links, and what still waits for it."""
+        if self._device is not None and not self._device_lost():
+            await self._operations.settle()
         self._device = self._lost = None
         attachment, self._attachment = self._attachment, AsyncExitStack()
         await attachment.aclose()
-        pending = set(self._tasks)
-        while pending:  # bumble's wait_for swallows a cancellation that comes with its answer (before Python 3.12)
-            for task in pending:
-                task.cancel()
-            _, pending = await asyncio.wait(pending, timeout=CANCEL_TIMEOUT_S)
+        await self._operations.close()
 
     async def _command(self, command: Coroutine[Any, Any, T]) -> T:
         """Carry an HCI command through, whatever becomes of the caller; BleakError where it fails."""
-        task = self._spawn(command)
-        done, _ = await asyncio.wait({task}, timeout=HCI_TIMEOUT_S)
-        if not done:
+        try:
+            return outcome(await self._operations.run(command, HCI_TIMEOUT_S))
+        except TimeoutError as error:
             await self._close()
-            raise BleakError("the controller does not answer: it was given up, the next use opens it anew")
-        return outcome(task)
+            raise BleakError(f"{error}: the controller was given up, the next use opens it anew") from error
 
     async def _abandon(self, device: Device, attempt: asyncio.Task[Connection]) -> None:
         """End an attempt to connect, and the connection too where it was made in the last moment."""
-        self._spawn(device.send_sync_command(hci.HCI_LE_Create_Connection_Cancel_Command()))
+        self._operations.spawn(device.send_sync_command(hci.HCI_LE_Create_Connection_Cancel_Command()))
         await asyncio.wait({attempt}, timeout=CANCEL_TIMEOUT_S)
         if not attempt.done():
             await self._close()
         elif not attempt.cancelled() and attempt.exception() is None:
-            self._spawn(attempt.result().disconnect())
-
-    def _spawn(self, operation: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
-        task = asyncio.create_task(operation, name=f"{self._name} operation")
-        self._tasks.add(task)
-        task.add_done_callback(self._finished)
-        return task
-
-    def _finished(self, task: asyncio.Task[Any]) -> None:
-        self._tasks.discard(task)
-        if not task.cancelled():
-            task.exception()  # whoever waited has it; where nobody does, asyncio need not complain
+            self._operations.spawn(attempt.result().disconnect())
 
 
 def outcome(task: asyncio.Task[T]) -> T:

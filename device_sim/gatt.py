@@ -14,6 +14,8 @@ from enum import StrEnum
 from types import TracebackType
 from typing import Final, Self
 
+from bumble.transport.common import Transport
+
 from device_sim.bracelet import Bracelet
 from device_sim.controller import Air
 from device_sim.peripheral import DEFAULT_MTU, Peripheral, advertisement
@@ -184,27 +186,33 @@ class GattBracelet:
 
     async def _stay_on_air(self) -> None:
         while True:
+            peripheral = None
             try:
                 async with self._air.attach(self._name) as transport:
-                    self._peripheral = Peripheral(
-                        transport,
-                        self.bracelet,
-                        name=self._name,
-                        max_mtu=self._max_mtu,
-                        on_subscribed=self._listened.set,
-                    )
-                    self._peripheral.muted, self._peripheral.away = self._muted, self._away
-                    await self._peripheral.start()
-                    self._attached.set()
-                    await self._peripheral.serve()
+                    peripheral = self._power_on(transport)
+                    try:
+                        await peripheral.start()
+                        self._attached.set()
+                        await peripheral.serve()
+                    finally:
+                        await peripheral.settle_commands()
             except LinkError:
                 if not self._attached.is_set():
                     raise
             finally:
-                if self._peripheral is not None:
-                    self._links_before += self._peripheral.links_made
                 self._peripheral = None
+                if peripheral is not None:
+                    self._links_before += peripheral.links_made
+                    await peripheral.close()
             await asyncio.sleep(REOPEN_S)
+
+    def _power_on(self, transport: Transport) -> Peripheral:
+        peripheral = Peripheral(
+            transport, self.bracelet, name=self._name, max_mtu=self._max_mtu, on_subscribed=self._listened.set
+        )
+        peripheral.muted, peripheral.away = self._muted, self._away
+        self._peripheral = peripheral
+        return peripheral
 
     async def _play(self) -> None:
         if self._start is Start.ON_SUBSCRIBE:

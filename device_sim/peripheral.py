@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
-from collections.abc import Awaitable, Callable
-from typing import Final
+from collections.abc import Callable, Coroutine
+from typing import Any, Final
 
 from bumble import att, data_types, hci
 from bumble.core import UUID, AdvertisingData, BaseBumbleError
@@ -19,6 +19,7 @@ from bumble.host import Host
 from bumble.transport.common import Transport
 
 from device_sim.bracelet import Bracelet
+from device_sim.operations import Operations
 from service.errors import LinkError, LinkFault, ParameterError
 from service.wearables import bracelet as wire
 
@@ -83,9 +84,10 @@ class Peripheral:
         self.muted = False
         self.away = False
         self.links_made = 0
-        self._data = _characteristic(wire.DATA, _P.NOTIFY, lambda: b"")
+        self._data = _characteristic(wire.DATA, _P.NOTIFY, None)
         self._battery = _characteristic(wire.BATTERY_LEVEL, _P.READ | _P.NOTIFY, bracelet.battery_value)
         self.device.add_services(_services(bracelet, self._data, self._battery))
+        self._operations = Operations(name)
         self._on_subscribed = on_subscribed
         self._subscribed = False
         self._link: Connection | None = None
@@ -172,19 +174,24 @@ class Peripheral:
         )
         await self._hci(gone.wait())
 
-    async def _hci(self, command: Awaitable[object]) -> None:
-        task = asyncio.current_task()
-        cancelled = task.cancelling() if task else 0
+    async def settle_commands(self) -> None:
+        """Let the controller answer what it was asked, before it is given back."""
+        await self._operations.settle()
+
+    async def close(self) -> None:
+        """End what waits for an answer, after the transport is gone."""
+        await self._operations.close()
+
+    async def _hci(self, command: Coroutine[Any, Any, object]) -> None:
+        """Carry a command through; LinkError where the controller fails, nothing where the air is lost."""
         try:
-            async with asyncio.timeout(HCI_TIMEOUT_S):
-                await command
-        except (TimeoutError, BaseBumbleError) as error:
+            (await self._operations.run(command, HCI_TIMEOUT_S)).result()
+        except (TimeoutError, BaseBumbleError, asyncio.CancelledError) as error:
             if self._lost.done():
                 return  # `serve` ends by itself
+            if isinstance(error, asyncio.CancelledError):
+                raise
             raise LinkError(LinkFault.NO_ADAPTER, f"the bracelet's controller does not answer: {error!r}") from error
-        if task and task.cancelling() > cancelled:
-            # bumble waits with wait_for, which before Python 3.12 swallows a cancellation that comes with the answer.
-            raise asyncio.CancelledError
 
     def _on_connection(self, link: Connection) -> None:
         self._link = link
@@ -236,7 +243,16 @@ def _services(bracelet: Bracelet, data: Characteristic[bytes], battery: Characte
     ]
 
 
-def _characteristic(uuid: str, properties: _P, value: Callable[[], bytes]) -> Characteristic[bytes]:
+def _characteristic(uuid: str, properties: _P, value: Callable[[], bytes] | None) -> Characteristic[bytes]:
+    """Return a characteristic that refuses what it does not offer; bumble would leave a refused write unanswered."""
+
+    def read(_connection: object) -> bytes:
+        if value is None:
+            raise att.ATT_Error(att.ErrorCode.READ_NOT_PERMITTED)
+        return value()
+
+    def write(_connection: object, _value: bytes) -> None:
+        raise att.ATT_Error(att.ErrorCode.WRITE_NOT_PERMITTED)
+
     short = uuid[4:8] if uuid.endswith("-0000-1000-8000-00805f9b34fb") else uuid
-    permissions = Characteristic.READABLE if properties & _P.READ else Characteristic.Permissions(0)
-    return Characteristic(short, properties, permissions, CharacteristicValue(read=lambda _connection: value()))
+    return Characteristic(short, properties, Characteristic.READABLE, CharacteristicValue(read=read, write=write))
