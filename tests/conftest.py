@@ -2,11 +2,12 @@
 
 import os
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 
-def missing(what: str) -> None:
+def missing(what: str) -> NoReturn:
     """Skip for a missing tool or data set; fail instead where STEPLINK_REQUIRE=all promises that all is there."""
     if os.environ.get("STEPLINK_REQUIRE") == "all":
         pytest.fail(f"STEPLINK_REQUIRE=all, but {what}")

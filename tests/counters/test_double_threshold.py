@@ -75,6 +75,7 @@ def test_agrees_with_the_text(signal, half, length, valleys, wait, low, high, sh
         min_spacing=low,
         max_spacing=high,
         lower_share=share,
+        rest_raw=-1e9,  # off: with two peaks in a row a valley may lie above the first, and the text has no word on it
     )
     magnitude = np.sqrt(signal.values[:, 0] ** 2 + signal.values[:, 1] ** 2 + signal.values[:, 2] ** 2)
     magnitude = magnitude + 1e-9 * np.arange(len(signal)) % 7  # no ties that rounding could break either way
