@@ -22,6 +22,9 @@ LOG_NOTICES = 100_000
 YIELD_EVERY = 64
 """Packets handled in a row before others may run: 64 × 100 µs."""
 
+TELL_EVERY_NS = 1_000_000_000
+"""While packets come, the device's description (packets, losses, signal) is told so often."""
+
 Publish = Callable[[Notice], None]
 
 
@@ -36,6 +39,7 @@ class Session:
         self._publish = publish
         self._clock = HostClock()
         self._ordinal = 0
+        self._told_ns = 0
 
     async def follow(self, link: Link) -> None:
         """Take the link's packets until it is lost (LinkError) or the task is cancelled."""
@@ -48,13 +52,17 @@ class Session:
 
     def apply(self, packet: Packet) -> None:
         """Take one packet, from any link."""
+        samples = self.tracker.tally.samples
         events = self.tracker.apply(packet)
-        self._clock.arrived(self.tracker.now_s, packet.at_ns)
+        if any(isinstance(event, Rebooted) for event in events):
+            self._clock = HostClock()
+        if self.tracker.tally.samples != samples:
+            self._clock.arrived(self.tracker.now_s, packet.at_ns)
         for event in events:
-            if isinstance(event, Rebooted):
-                self._clock = HostClock()
-                self._clock.arrived(self.tracker.now_s, packet.at_ns)
             self.tell(event, self._host_ns(event))
+        if abs(packet.at_ns - self._told_ns) >= TELL_EVERY_NS:
+            self._told_ns = packet.at_ns
+            self.tell(DeviceChanged(), packet.at_ns)
 
     def state_changed(self, state: State, reason: str | None) -> None:
         """Tell that the device's connection came into another state."""

@@ -37,7 +37,7 @@ async def test_a_snapshot_first_then_events_that_keep_their_schema(walk):
     assert heard[0]["type"] == "snapshot"
     for message in heard:
         MESSAGE.validate_python(message)
-    assert {"signal", "counting", "step"} <= {message["type"] for message in heard}
+    assert {"signal", "counting", "step", "device"} <= {message["type"] for message in heard}
 
 
 async def test_durable_events_are_numbered_without_holes(walk):

@@ -116,9 +116,6 @@ class ScriptedServer:
         if path == "healthz":
             route.fulfill(json=self.health)
             return
-        if path == "api/v1/devices":
-            route.fulfill(json={"items": self.devices, "next": None})
-            return
         file = WEB / (path.removeprefix("web/") or "index.html")
         headers = {"content-security-policy": CONTENT_SECURITY_POLICY}
         route.fulfill(body=file.read_bytes(), content_type=MIME[file.suffix], headers=headers)

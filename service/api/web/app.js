@@ -13,7 +13,7 @@ import { duration, localTime, whole, zone } from "./format.js";
 const ANNOUNCE_MS = 10_000;
 const SECOND_MS = 1_000;
 const HEALTH_MS = 5_000;
-const TALLIES_MS = 2_000;
+const ANSWER_MS = 2_000;
 
 const $ = (id) => document.getElementById(id);
 const devices = new Devices();
@@ -97,16 +97,10 @@ function showDevices() {
 
 async function got(path) {
   try {
-    return await (await fetch(new URL(path, document.baseURI), { signal: AbortSignal.timeout(TALLIES_MS) })).json();
+    return await (await fetch(new URL(path, document.baseURI), { signal: AbortSignal.timeout(ANSWER_MS) })).json();
   } catch {
     return null;
   }
-}
-
-async function refreshTallies() {
-  if (server.state !== "open" || document.hidden || devices.all.length === 0) return;
-  devices.refresh((await got("api/v1/devices"))?.items ?? []);
-  dirty = true;
 }
 
 /** While there is no bracelet, say whether the server's Bluetooth is the reason. */
@@ -156,6 +150,5 @@ setInterval(() => {
   showServer();
 }, SECOND_MS);
 setInterval(showTrouble, HEALTH_MS);
-setInterval(refreshTallies, TALLIES_MS);
 feed.connect();
 requestAnimationFrame(frame);

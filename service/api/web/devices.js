@@ -6,11 +6,6 @@
 
 import { Trace } from "./trace.js";
 
-/** What grows with every packet and is not worth a message each: read from the list of devices now and then. */
-const TALLIES = [
-  "packets", "packets_bad", "packets_duplicate", "samples", "samples_lost", "gaps", "measured_rate_hz", "rssi_dbm",
-];
-
 export class Devices {
   #entries = new Map();
   #clockAheadMs = 0;
@@ -23,16 +18,6 @@ export class Devices {
     if (!entry || !Object.hasOwn(TAKERS, message.type)) return false;
     TAKERS[message.type](entry, message, nowMs);
     return true;
-  }
-
-  /** Take the tallies of a list of devices; counts and states stay the feed's, which is ahead of any list. */
-  refresh(items) {
-    for (const item of items) {
-      const entry = this.#entries.get(item.id);
-      if (!entry) continue;
-      const tallies = Object.fromEntries(TALLIES.map((name) => [name, item[name]]));
-      entry.device = { ...entry.device, ...tallies };
-    }
   }
 
   /** Return the entries `{device, trace}` in the order in which they came. */
