@@ -55,16 +55,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from service.counters import kernel
-from service.counters.contract import Snapshot, check_snapshot, choice, parameter, params_hash
-from service.samples import GRID_HZ, Band, Column, SampleBlock, Step, Update
-from service.signals.compiled import compiled
+from service.counters import double_threshold_kernel as kernel
+from service.counters.contract import choice, parameter
+from service.counters.streaming import Kernel, KernelCounter
+from service.samples import GRID_HZ, Band, SampleBlock, Step
 
 FILTER_DELAY: Final = 2
 """Samples by which the five-point mean lags."""
@@ -74,12 +73,6 @@ MOVING_SAMPLES: Final = 300
 
 NO_RUN: Final = 1e300
 """Longer than any run of rises or falls."""
-
-COMPILED_FROM: Final = 2000
-"""A block longer than this goes through the compiled kernel, if numba is there."""
-
-COMPILED_BLOCK: Final = 65_536
-"""Samples the compiled kernel eats at once: buffers stay in the cache."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,114 +116,46 @@ TUNED: Final = DoubleThresholdParams(
 )
 
 
-class DoubleThreshold:
-    """The adaptive double threshold as a streaming counter; its unit is g.
+_KERNEL: Final = Kernel(
+    begin=kernel.begin,
+    scan=kernel.scan,
+    close=kernel.close,
+    stop=kernel.stop,
+    pending=kernel.pending,
+    next_index=kernel.NEXT,
+    constants=kernel.CONSTANTS,
+    row=kernel.ROW,
+    delay=FILTER_DELAY,
+)
 
-    >>> DoubleThreshold(TUNED).update(SampleBlock(start=0, acc_g=([0.0] * 9, [0.0] * 9, [1.0] * 9))).steps
+
+def build(params: DoubleThresholdParams = TUNED) -> KernelCounter:
+    """Return the adaptive double threshold as a streaming counter; its unit is g.
+
+    >>> build(TUNED).update(SampleBlock(start=0, acc_g=([0.0] * 9, [0.0] * 9, [1.0] * 9))).steps
     ()
     """
+    return KernelCounter(
+        "double_threshold",
+        params,
+        kernel=_KERNEL,
+        state=_fresh_state(params),
+        room=lambda n: _out_length(n, params),
+        events=_events,
+        latency_s=_latency_s(params),
+    )
 
-    name: Final = "double_threshold"
-    version: Final = 1
 
-    def __init__(self, params: DoubleThresholdParams = TUNED) -> None:
-        self.params = params
-        self._state = _fresh_state(params)
-        self._room = 0
-        self._out: list[float] = []
-        self._reserve(0)
+def _latency_s(p: DoubleThresholdParams) -> float:
+    """Return the longest time from a step to its confirmation.
 
-    @property
-    def latency_s(self) -> float:
-        """The longest time from a step to its confirmation.
-
-        A peak waits for its valleys and then at most for the end of a window, seen N samples later; a credited one also
-        for the bout's other peaks, each less than max_spacing after the last. A gap in the data comes on top.
-        """
-        p = self.params
-        wait = FILTER_DELAY + p.valley_wait + p.longest_window + p.half_width
-        if p.credit == "retrospective":
-            wait += (p.bout - 1) * (p.max_spacing - 1)
-        return wait / GRID_HZ
-
-    def update(self, block: SampleBlock) -> Update:
-        """Count on over `block`; ValueError where it overlaps the one before."""
-        n = len(block)
-        if n == 0:
-            return Update(pending=kernel.pending(self._state))
-        rows = [] if block.start == self._state[kernel.NEXT] else self._open(block)
-        if n > COMPILED_FROM:
-            arrays = self._scan_arrays(block)
-            trace, found = arrays[0].tolist(), arrays[1].tolist()
-        else:
-            trace, found = self._scan_lists(block, n)
-        steps, bands = _events(rows + found) if rows or found else ((), ())
-        return Update(
-            steps=steps,
-            pending=kernel.pending(self._state),
-            trace_from_s=(block.start - FILTER_DELAY) / GRID_HZ,
-            trace=trace,
-            bands=bands,
-        )
-
-    def finish(self) -> Update:
-        """End the stream: what waits is decided with what is there, an uncertain bout is dropped."""
-        steps, bands = _events(self._close())
-        self._state[kernel.NEXT] = -1.0
-        self._state[kernel.BOUT_PEAKS] = 0.0
-        return Update(steps=steps, bands=bands)
-
-    def snapshot(self) -> Snapshot:
-        """Return the whole state as plain data."""
-        state = self._state[kernel.CONSTANTS :]
-        return {"counter": self.name, "version": self.version, "params": params_hash(self.params), "state": state}
-
-    def restore(self, state: Snapshot) -> None:
-        """Take over a snapshot's state; SnapshotError where it is another counter's."""
-        check_snapshot(state, name=self.name, version=self.version, params=self.params)
-        self._state[kernel.CONSTANTS :] = map(float, state["state"])
-
-    def _open(self, block: SampleBlock) -> list[float]:
-        """Begin a stretch at the block's start; return the rows of the stretch that ended."""
-        if block.start < self._state[kernel.NEXT]:
-            raise ValueError(f"block starts at {block.start}, {int(self._state[kernel.NEXT])} was next")
-        rows = self._close()
-        x, y, z = (float(column[0]) for column in block.acc_g)
-        magnitude = sqrt(x * x + self._state[kernel.Y_WEIGHT] * (y * y) + z * z)
-        kernel.begin(self._state, block.start, magnitude)
-        return rows
-
-    def _close(self) -> list[float]:
-        if self._state[kernel.NEXT] < 0.0:
-            return []
-        return self._out[: kernel.end(self._state, self._out)]
-
-    def _scan_lists(self, block: SampleBlock, n: int) -> tuple[list[float], list[float]]:
-        if n > self._room:
-            self._reserve(n)
-        x, y, z = block.acc_g
-        end = kernel.scan(_as_list(x), _as_list(y), _as_list(z), n, self._state, self._out)
-        return self._out[:n], self._out[n:end]
-
-    def _scan_arrays(self, block: SampleBlock) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Feed the compiled kernel part by part; return X(n) and the rows, flat."""
-        columns = [np.ascontiguousarray(column, dtype=np.float64) for column in block.acc_g]
-        state = np.array(self._state)
-        out = np.empty(_out_length(COMPILED_BLOCK, self.params))
-        trace = np.empty(len(block))
-        rows: list[NDArray[np.float64]] = []
-        scan = compiled(kernel.scan)
-        for first in range(0, len(block), COMPILED_BLOCK):
-            x, y, z = (column[first : first + COMPILED_BLOCK] for column in columns)
-            end = scan(x, y, z, len(x), state, out)
-            trace[first : first + len(x)] = out[: len(x)]
-            rows.append(out[len(x) : end].copy())
-        self._state = state.tolist()
-        return trace, np.concatenate(rows)
-
-    def _reserve(self, n: int) -> None:
-        self._room = n
-        self._out = [0.0] * _out_length(n, self.params)
+    A peak waits for its valleys and then at most for the end of a window, seen N samples later; a credited one also for
+    the bout's other peaks, each less than max_spacing after the last. A gap in the data comes on top.
+    """
+    wait = FILTER_DELAY + p.valley_wait + p.longest_window + p.half_width
+    if p.credit == "retrospective":
+        wait += (p.bout - 1) * (p.max_spacing - 1)
+    return wait / GRID_HZ
 
 
 def step_rows(block: SampleBlock, params: DoubleThresholdParams = TUNED) -> NDArray[np.float64]:
@@ -239,11 +164,7 @@ def step_rows(block: SampleBlock, params: DoubleThresholdParams = TUNED) -> NDAr
     Returns one row a step: grid index of the peak on X(n) (two samples after the step), samples since the step before
     (0 none), peak, valley, T_H, T_L in g.
     """
-    if len(block) == 0:
-        return np.empty((0, kernel.ROW - 1))
-    counter = DoubleThreshold(params)
-    counter._open(block)  # noqa: SLF001  # this module's own
-    rows = np.concatenate([counter._scan_arrays(block)[1], counter._close()]).reshape(-1, kernel.ROW)  # noqa: SLF001
+    rows = build(params).count(block)
     steps: NDArray[np.float64] = rows[rows[:, 0] == kernel.STEP, 1:]
     return steps
 
@@ -253,7 +174,7 @@ def sampled_window(block: SampleBlock, params: DoubleThresholdParams) -> int:
 
     Published mode (a): one walk a person and pace, of a set number of steps or a set time.
     """
-    counter = DoubleThreshold(replace(params, window_mode="fixed", credit="retrospective"))
+    counter = build(replace(params, window_mode="fixed", credit="retrospective"))
     steps = counter.update(block).steps + counter.finish().steps
     spacings = [step.interval_s * GRID_HZ for step in steps if step.interval_s is not None]
     if not spacings:
@@ -298,10 +219,6 @@ def _capacity(p: DoubleThresholdParams) -> int:
 def _out_length(n: int, p: DoubleThresholdParams) -> int:
     """Floats that n samples and their rows may take: rows come of waiting peaks, new peaks and closed windows."""
     return n + kernel.ROW * (_capacity(p) + kernel.HELD_MAX + n // 2 + 2)
-
-
-def _as_list(column: Column) -> list[float]:
-    return column if isinstance(column, list) else [float(value) for value in column]
 
 
 def _events(rows: Sequence[float]) -> tuple[tuple[Step, ...], tuple[Band, ...]]:

@@ -42,7 +42,7 @@ def _kind(
 _KINDS: Final = (
     _kind(
         "double_threshold",
-        double_threshold.DoubleThreshold,
+        double_threshold.build,
         paper=double_threshold.PAPER,
         tuned=double_threshold.TUNED,
         sensors=ACCELEROMETER,

@@ -12,18 +12,18 @@ from counters.conformance import Signal, collect, cut_signals, signals, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.counters import kernel
+from service.counters import double_threshold_kernel as kernel
 from service.counters.contract import with_overrides
 from service.counters.double_threshold import (
-    COMPILED_FROM,
     PAPER,
     TUNED,
-    DoubleThreshold,
     DoubleThresholdParams,
+    build,
     middle_window,
     sampled_window,
     step_rows,
 )
+from service.counters.streaming import COMPILED_FROM
 from service.errors import ParameterError
 from service.samples import GRID_HZ, SampleBlock, Update
 
@@ -39,7 +39,7 @@ def block_of(magnitude, start=0):
 
 
 def steps_of(params, magnitude):
-    return collect(DoubleThreshold(params), [block_of(magnitude)], finish=True).steps
+    return collect(build(params), [block_of(magnitude)], finish=True).steps
 
 
 def peaks_of(steps):
@@ -90,7 +90,7 @@ def test_agrees_with_the_text(signal, half, length, valleys, wait, low, high, sh
 def test_filter_is_the_mean_of_five_with_its_delay_taken_off():
     impulse = [1.0] * 20
     impulse[10] = 6.0
-    update = DoubleThreshold(PAPER).update(block_of(impulse, start=100))
+    update = build(PAPER).update(block_of(impulse, start=100))
     assert update.trace == pytest.approx([1.0] * 10 + [2.0] * 5 + [1.0] * 5)
     assert update.trace_from_s == pytest.approx((100 - 2) / GRID_HZ)
     centre_s = update.trace_from_s + 12 / GRID_HZ
@@ -100,13 +100,13 @@ def test_filter_is_the_mean_of_five_with_its_delay_taken_off():
 @pytest.mark.parametrize(("axes", "expected"), [("xz", 5.0), ("norm", 13.0)])
 def test_magnitude_of_two_axes_or_three(axes, expected):
     block = SampleBlock(start=0, acc_g=([3.0] * 5, [12.0] * 5, [4.0] * 5))
-    assert DoubleThreshold(replace(PAPER, axes=axes)).update(block).trace == [expected] * 5
+    assert build(replace(PAPER, axes=axes)).update(block).trace == [expected] * 5
 
 
 def test_thresholds_of_a_window_come_from_its_own_extrema():
     x = oracle.smooth(bumpy(400))
     found = oracle.extrema(x, 2)
-    bands = collect(DoubleThreshold(PLAIN), [block_of(bumpy(400))], finish=True).bands
+    bands = collect(build(PLAIN), [block_of(bumpy(400))], finish=True).bands
     expected = [bounds for bounds in oracle.thresholds(found, 400, 30) if bounds]
     assert [(band.upper, band.lower) for band in bands] == [pytest.approx(bounds) for bounds in expected]
     assert len(bands) == 14
@@ -115,8 +115,8 @@ def test_thresholds_of_a_window_come_from_its_own_extrema():
 
 
 def test_lower_share_lifts_the_lower_threshold_only():
-    plain = collect(DoubleThreshold(PLAIN), [block_of(bumpy(400))]).bands
-    lifted = collect(DoubleThreshold(replace(PLAIN, lower_share=0.25)), [block_of(bumpy(400))]).bands
+    plain = collect(build(PLAIN), [block_of(bumpy(400))]).bands
+    lifted = collect(build(replace(PLAIN, lower_share=0.25)), [block_of(bumpy(400))]).bands
     for a, b in zip(plain, lifted, strict=True):
         assert b.upper == a.upper
         assert b.lower == pytest.approx(a.lower + 0.25 * 2 * (a.upper - a.lower))
@@ -160,13 +160,13 @@ def test_a_spacing_of_the_maximum_is_a_new_reference(max_spacing, counted):
 def test_nothing_counts_before_both_means_exist():
     one_peak_then_valleys = np.concatenate([np.linspace(1.0, 2.0, 15), np.linspace(2.0, 0.5, 40), bumpy(200)])
     params = replace(PLAIN, first_window=30, lower_share=0.9, credit="retrospective")
-    update = DoubleThreshold(params).update(block_of(one_peak_then_valleys))
+    update = build(params).update(block_of(one_peak_then_valleys))
     assert update.bands[0].from_s >= 28 / GRID_HZ
     assert min(step.at_s for step in update.steps) >= update.bands[0].from_s
 
 
 def test_a_peak_waits_for_its_valley_as_long_as_it_may_and_no_longer():
-    counter = DoubleThreshold(replace(PLAIN, valley_wait=100))
+    counter = build(replace(PLAIN, valley_wait=100))
     counter.update(block_of(bumpy(585)))
     ramp = np.linspace(1.5, 0.1, 200)
     pending = [counter.update(block_of(ramp[k : k + 1], start=585 + k)).pending for k in range(len(ramp))]
@@ -188,7 +188,7 @@ def test_rest_is_raw_units_over_their_size():
 def test_a_crest_of_two_equal_samples_is_a_peak_only_where_ties_go_on():
     signal = Signal(walk(2000, 1.0, 0.3))  # 50 samples a step: the mean of five has two equal greatest values
     counted = {
-        ties: len(collect(DoubleThreshold(replace(TUNED, ties=ties)), [signal.block()], finish=True).steps)
+        ties: len(collect(build(replace(TUNED, ties=ties)), [signal.block()], finish=True).steps)
         for ties in ("break", "go_on")
     }
     assert counted["go_on"] == 39
@@ -197,19 +197,19 @@ def test_a_crest_of_two_equal_samples_is_a_peak_only_where_ties_go_on():
 
 @pytest.mark.parametrize("step_hz", [1.25, 2.0, 2.3])
 def test_window_becomes_the_mean_spacing_of_steps(step_hz):
-    counter = DoubleThreshold(replace(TUNED, first_window=40))
+    counter = build(replace(TUNED, first_window=40))
     counter.update(block_of(bumpy(1500, step_hz)))
     assert counter.snapshot()["state"][kernel.WINDOW - kernel.CONSTANTS] == round(GRID_HZ / step_hz)
 
 
 def test_a_long_mean_spacing_is_halved():
-    counter = DoubleThreshold(replace(TUNED, window_limit=35))
+    counter = build(replace(TUNED, window_limit=35))
     counter.update(block_of(bumpy(1500, 1.25)))
     assert counter.snapshot()["state"][kernel.WINDOW - kernel.CONSTANTS] == 20
 
 
 def test_a_fixed_window_stays():
-    counter = DoubleThreshold(replace(TUNED, window_mode="fixed", first_window=44))
+    counter = build(replace(TUNED, window_mode="fixed", first_window=44))
     counter.update(block_of(bumpy(1500)))
     assert counter.snapshot()["state"][kernel.WINDOW - kernel.CONSTANTS] == 44
 
@@ -223,10 +223,10 @@ def test_window_of_a_sampling_walk_and_of_the_middle():
 
 
 def test_after_a_long_gap_only_belief_lasts():
-    walked = DoubleThreshold(TUNED)
+    walked = build(TUNED)
     walked.update(block_of(bumpy(700)))
     belief = slice(0, kernel.BOUT_PEAKS - kernel.CONSTANTS)
-    fresh = DoubleThreshold(TUNED)
+    fresh = build(TUNED)
     state = fresh.snapshot()
     fresh_belief = list(state["state"][belief])
     walked.finish()
@@ -239,7 +239,7 @@ def test_after_a_long_gap_only_belief_lasts():
 
 @pytest.mark.parametrize(("gap", "goes_on"), [(40, True), (80, True), (150, False)])
 def test_a_certain_bout_goes_on_over_a_short_gap(gap, goes_on):
-    counter = DoubleThreshold(TUNED)
+    counter = build(TUNED)
     counter.update(block_of(bumpy(600)))
     few_steps = collect(counter, [block_of(bumpy(80), start=600 + gap)], finish=True).steps
     after = [step for step in few_steps if step.at_s > 12.0]
@@ -248,14 +248,14 @@ def test_a_certain_bout_goes_on_over_a_short_gap(gap, goes_on):
 
 
 def test_an_uncertain_bout_ends_with_a_gap():
-    counter = DoubleThreshold(TUNED)
+    counter = build(TUNED)
     held = block_of(np.concatenate([np.ones(60), bumpy(90)]))
     assert counter.update(held).pending >= 2
     assert collect(counter, [block_of(bumpy(80), start=190)], finish=True).steps == []
 
 
 def test_pending_rises_while_a_bout_is_uncertain_and_falls_when_it_ends():
-    counter = DoubleThreshold(TUNED)
+    counter = build(TUNED)
     magnitude = np.concatenate([np.ones(60), bumpy(70), np.ones(400)])
     pending = [counter.update(block_of(magnitude[k : k + 10], start=k)).pending for k in range(0, len(magnitude), 10)]
     assert max(pending) >= 2
@@ -263,8 +263,8 @@ def test_pending_rises_while_a_bout_is_uncertain_and_falls_when_it_ends():
 
 
 def test_latency_is_the_sum_of_its_waits():
-    assert DoubleThreshold(PAPER).latency_s == pytest.approx((2 + 100 + 126 + 2) / GRID_HZ)
-    assert DoubleThreshold(TUNED).latency_s == pytest.approx((2 + 50 + 60 + 1 + 4 * 74) / GRID_HZ)
+    assert build(PAPER).latency_s == pytest.approx((2 + 100 + 126 + 2) / GRID_HZ)
+    assert build(TUNED).latency_s == pytest.approx((2 + 50 + 60 + 1 + 4 * 74) / GRID_HZ)
 
 
 @few
@@ -279,7 +279,7 @@ def test_noise_never_overflows_the_queue_or_the_rows(seed, half, wait, length, s
     params = replace(
         TUNED, half_width=half, valley_wait=wait, first_window=length, min_spacing=spacing, rest_raw=0.0, bout=12
     )
-    counter = DoubleThreshold(params)
+    counter = build(params)
     rng = np.random.default_rng(seed)
     x = 1.0 + rng.standard_normal(1900) * rng.choice([0.0, 1.0], size=1900)
     capacity = int(counter._state[kernel.CAPACITY])
@@ -293,7 +293,7 @@ def test_noise_never_overflows_the_queue_or_the_rows(seed, half, wait, length, s
 
 def test_zigzag_fills_the_queue_no_further_than_it_holds():
     params = replace(TUNED, half_width=1, valley_wait=250, max_spacing=500)
-    counter = DoubleThreshold(params)
+    counter = build(params)
     zigzag = np.where(np.arange(3000) % 10 < 5, 1.0, 2.0) + np.arange(3000) * 0.01
     worst = 0.0
     for k in range(0, 3000, 10):
@@ -306,7 +306,7 @@ def test_zigzag_fills_the_queue_no_further_than_it_holds():
 @given(cut=cut_signals())
 def test_rows_of_a_recording_are_the_steps(cut):
     signal, _ = cut
-    steps = collect(DoubleThreshold(TUNED), [signal.block()], finish=True).steps
+    steps = collect(build(TUNED), [signal.block()], finish=True).steps
     rows = step_rows(signal.block(), TUNED)
     assert [(r[0] - 2) / GRID_HZ for r in rows] == [step.at_s for step in steps]
     assert [r[2] - r[3] for r in rows] == [step.strength for step in steps]
@@ -318,11 +318,11 @@ def test_rows_of_nothing_are_none():
 
 
 def test_an_empty_block_says_nothing():
-    assert DoubleThreshold(TUNED).update(block_of([])) == Update()
+    assert build(TUNED).update(block_of([])) == Update()
 
 
 def test_an_overlapping_block_is_refused():
-    counter = DoubleThreshold(TUNED)
+    counter = build(TUNED)
     counter.update(block_of(np.ones(20)))
     with pytest.raises(ValueError, match="20 was next"):
         counter.update(block_of(np.ones(20), start=19))
@@ -330,7 +330,7 @@ def test_an_overlapping_block_is_refused():
 
 def test_state_is_plain_floats_on_either_path():
     long = Signal(np.tile(walk(500, 2.0, 0.5), (COMPILED_FROM // 500 + 1, 1)))
-    counter = DoubleThreshold(TUNED)
+    counter = build(TUNED)
     counter.update(long.block(arrays=True))
     counter.update(long.block(0, 30, offset=len(long), arrays=True))
     assert {type(value) for value in counter.snapshot()["state"]} == {float}

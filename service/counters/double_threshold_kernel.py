@@ -1,6 +1,6 @@
 """The adaptive double threshold as scalar kernels over one flat state: plain while live, compiled for recordings.
 
-`begin` opens a stretch of samples, `scan` eats them, `end` decides what is left; `double_threshold` says what they
+`begin` opens a stretch of samples, `scan` eats them, `close` decides what is left; `double_threshold` says what they
 compute and why. The state `s` holds floats only: first the constants of an instance (`Y_WEIGHT` … `REFRESH`), then what
 changes. Samples are named by their grid index. Events are rows of `ROW` floats written to `out` after its first n
 entries: `(BAND, from, to, T_H, T_L, 0, 0)` for a closed window, `(STEP, index, spacing or 0, peak, valley, T_H, T_L)`.
@@ -92,8 +92,9 @@ Floats = Sequence[float]
 State = MutableSequence[float]
 
 
-def begin(s: State, index: int, magnitude: float) -> None:
+def begin(s: State, index: int, x: float, y: float, z: float) -> None:
     """Open a stretch at grid index `index`, whose magnitude stands for those before it; only a certain bout goes on."""
+    magnitude = sqrt(x * x + s[Y_WEIGHT] * (y * y) + z * z)
     if s[BOUT_PEAKS] < s[BOUT]:
         s[BOUT_PEAKS] = 0.0
     for name in (RUN, RUN_BEFORE, TURN, PEAK_SUM, PEAKS, VALLEY_SUM, VALLEYS_SEEN, HEAD, COUNT):
@@ -134,7 +135,7 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
             run = 0.0
         last = filtered
         if k == close_at:
-            end_of_rows = _close(s, k - half, out, end_of_rows)
+            end_of_rows = _close_window(s, k - half, out, end_of_rows)
             close_at = s[CLOSE_AT]
         k += 1.0
     s[M1], s[M2], s[M3], s[M4] = m1, m2, m3, m4
@@ -143,12 +144,18 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
     return end_of_rows
 
 
-def end(s: State, out: State) -> int:
+def close(s: State, out: State) -> int:
     """End the stretch: decide every peak with what is there, write rows to `out[0:]`, return where they end."""
     rows = 0
     if s[NEXT] > s[WINDOW_FROM]:
-        rows = _close(s, s[NEXT] - 1.0, out, rows)
+        rows = _close_window(s, s[NEXT] - 1.0, out, rows)
     return _settle(s, s[NEXT] + s[WAIT] + 1.0, out, rows)
+
+
+def stop(s: State) -> None:
+    """End the stream: an uncertain bout is dropped."""
+    s[NEXT] = -1.0
+    s[BOUT_PEAKS] = 0.0
 
 
 def pending(s: State) -> int:
@@ -195,7 +202,7 @@ def _valley(s: State, at: float, value: float, out: State, rows: int) -> int:
     return _settle(s, at, out, rows)
 
 
-def _close(s: State, to: float, out: State, rows: int) -> int:
+def _close_window(s: State, to: float, out: State, rows: int) -> int:
     """Close the window that ends with sample `to`: its thresholds (9)–(16), then its peaks."""
     if s[PEAKS] > 0.0:
         s[HIGH] = _mean(s[PEAK_SUM], s[PEAKS], s[HIGH], s[HIGH_KNOWN])

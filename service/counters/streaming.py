@@ -1,0 +1,189 @@
+"""A step counter made of scalar kernels: the part that every published algorithm shares.
+
+An algorithm is four functions over one flat state of floats (`Kernel`), a fresh state, and how its rows read as steps;
+`KernelCounter` keeps the state, opens and closes stretches at gaps, and runs the same kernels over lists while live or,
+compiled, over the arrays of a whole recording. Steps and state are the same, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.counters.contract import Snapshot, check_snapshot, params_hash
+from service.errors import CounterError
+from service.samples import GRID_HZ, Band, Column, SampleBlock, Sensor, Step, Update
+from service.signals.compiled import compiled
+
+COMPILED_FROM: Final = 2000
+"""A block longer than this goes through the compiled kernel, if numba is there."""
+
+COMPILED_BLOCK: Final = 65_536
+"""Samples the compiled kernel eats at once: buffers stay in the cache."""
+
+FIELDS: Final = {
+    Sensor.ACCELEROMETER: "acc_g",
+    Sensor.GYROSCOPE: "gyro_rad_s",
+    Sensor.MAGNETOMETER: "mag_ut",
+}
+
+Events = tuple[tuple[Step, ...], tuple[Band, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kernel:
+    """One algorithm as scalar functions over a flat state `s`; columns are x, y, z of each of its `sensors`, in order.
+
+    `begin(s, index, *first)` opens a stretch at grid index `index`, `first` being its first sample.
+    `scan(*columns, n, s, out)` eats n samples, writes the filtered signal to `out[:n]` and rows after it, and returns
+    where they end; it is compiled for whole recordings. `close(s, out)` ends the stretch (at a gap or the end), writes
+    rows to `out[0:]` and returns where they end. `stop(s)` forgets what must not outlast the end of the stream.
+    `pending(s)` counts likely steps. `s[next_index]` is the index of the sample to come, −1 before the first stretch;
+    `s[:constants]` never changes. A row is `row` floats; `delay` is by how many samples the filtered signal lags.
+    """
+
+    begin: Callable[..., None]
+    scan: Callable[..., int]
+    close: Callable[[Any, Any], int]
+    stop: Callable[[Any], None]
+    pending: Callable[[Any], int]
+    next_index: int
+    constants: int
+    row: int
+    delay: float
+    sensors: tuple[Sensor, ...] = (Sensor.ACCELEROMETER,)
+
+
+class KernelCounter:
+    """A streaming counter over `kernel`; see the contract.
+
+    `state` is a fresh state, `room(n)` how many floats n samples and their rows may take, `events(rows)` reads rows as
+    steps and bands, `latency_s` is the longest time from a step to its confirmation.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        params: object,
+        *,
+        kernel: Kernel,
+        state: list[float],
+        room: Callable[[int], int],
+        events: Callable[[Sequence[float]], Events],
+        latency_s: float,
+        version: int = 1,
+    ) -> None:
+        self.name = name
+        self.params = params
+        self.version = version
+        self.latency_s = latency_s
+        self._kernel = kernel
+        self._state = state
+        self._room_for = room
+        self._events = events
+        self._room = 0
+        self._out: list[float] = [0.0] * room(0)
+
+    def update(self, block: SampleBlock) -> Update:
+        """Count on over `block`; ValueError where it overlaps, CounterError where a sensor is missing."""
+        kernel, n = self._kernel, len(block)
+        if n == 0:
+            return Update(pending=kernel.pending(self._state))
+        columns = self._columns(block)
+        rows = [] if block.start == self._state[kernel.next_index] else self._open(block.start, columns)
+        if n > COMPILED_FROM:
+            arrays = self._scan_arrays(columns, n)
+            trace, found = arrays[0].tolist(), arrays[1].tolist()
+        else:
+            trace, found = self._scan_lists(columns, n)
+        steps, bands = self._events(rows + found) if rows or found else ((), ())
+        return Update(
+            steps=steps,
+            pending=kernel.pending(self._state),
+            trace_from_s=(block.start - kernel.delay) / GRID_HZ,
+            trace=trace,
+            bands=bands,
+        )
+
+    def finish(self) -> Update:
+        """End the stream: what waits is decided with what is there."""
+        steps, bands = self._events(self._close())
+        self._kernel.stop(self._state)
+        return Update(steps=steps, bands=bands)
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state as plain data."""
+        state = self._state[self._kernel.constants :]
+        return {"counter": self.name, "version": self.version, "params": params_hash(self.params), "state": state}
+
+    def restore(self, state: Snapshot) -> None:
+        """Take over a snapshot's state; SnapshotError where it is another counter's."""
+        check_snapshot(state, name=self.name, version=self.version, params=self.params)
+        self._state[self._kernel.constants :] = map(float, state["state"])
+
+    def count(self, block: SampleBlock) -> NDArray[np.float64]:
+        """Count a whole recording from a fresh state without making a Step of each: `update` and `finish`, faster.
+
+        Returns the kernel's rows (m × `row`), those of `update` before those of `finish`.
+        """
+        if len(block) == 0:
+            return np.empty((0, self._kernel.row))
+        columns = self._columns(block)
+        self._open(block.start, columns)
+        rows = np.concatenate([self._scan_arrays(columns, len(block))[1], self._close()])
+        self._kernel.stop(self._state)
+        return rows.reshape(-1, self._kernel.row)
+
+    def _columns(self, block: SampleBlock) -> tuple[Column, ...]:
+        columns: tuple[Column, ...] = ()
+        for sensor in self._kernel.sensors:
+            found = getattr(block, FIELDS[sensor])
+            if found is None:
+                raise CounterError(f"{self.name} needs a {sensor.value}, and the device sends none")
+            columns += found
+        return columns
+
+    def _open(self, start: int, columns: tuple[Column, ...]) -> list[float]:
+        """Begin a stretch at grid index `start`; return the rows of the stretch that ended."""
+        awaited = self._state[self._kernel.next_index]
+        if start < awaited:
+            raise ValueError(f"block starts at {start}, {int(awaited)} was next")
+        rows = self._close()
+        self._kernel.begin(self._state, start, *(float(column[0]) for column in columns))
+        return rows
+
+    def _close(self) -> list[float]:
+        if self._state[self._kernel.next_index] < 0.0:
+            return []
+        return self._out[: self._kernel.close(self._state, self._out)]
+
+    def _scan_lists(self, columns: tuple[Column, ...], n: int) -> tuple[list[float], list[float]]:
+        if n > self._room:
+            self._room, self._out = n, [0.0] * self._room_for(n)
+        end = self._kernel.scan(*map(_as_list, columns), n, self._state, self._out)
+        return self._out[:n], self._out[n:end]
+
+    def _scan_arrays(self, columns: tuple[Column, ...], n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Feed the compiled kernel part by part; return the filtered signal and the rows, flat."""
+        arrays = [np.ascontiguousarray(column, dtype=np.float64) for column in columns]
+        state = np.array(self._state)
+        out = np.empty(self._room_for(COMPILED_BLOCK))
+        trace = np.empty(n)
+        rows: list[NDArray[np.float64]] = []
+        scan = compiled(self._kernel.scan)
+        for first in range(0, n, COMPILED_BLOCK):
+            parts = [array[first : first + COMPILED_BLOCK] for array in arrays]
+            m = len(parts[0])
+            end = scan(*parts, m, state, out)
+            trace[first : first + m] = out[:m]
+            rows.append(out[m:end].copy())
+        self._state = state.tolist()
+        return trace, np.concatenate(rows)
+
+
+def _as_list(column: Column) -> list[float]:
+    return column if isinstance(column, list) else [float(value) for value in column]
