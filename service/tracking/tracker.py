@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.counters.contract import StepCounter
-from service.errors import WireError, WireFault
+from service.errors import CounterError, WireError, WireFault
 from service.samples import (
     TICK_EVERY,
     Columns,
@@ -67,6 +67,8 @@ class Tracker:
         self.steps = dict.fromkeys(counters, 0)
         self.steps_now = 0
         self.last_fault: WireError | None = None
+        self.counter_faults: dict[str, str] = {}
+        """Why a counter does not count, as a sentence: a sensor that the device does not send."""
         self._wearable = wearable
         self._factories = dict(counters)
         self._counters = {name: make() for name, make in counters.items()}
@@ -96,17 +98,17 @@ class Tracker:
 
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
+        said: RawBlock | DeviceInfo | None = None
         try:
             said = self._wearable.feed(packet.characteristic, packet.data)
             if isinstance(said, RawBlock):
                 self.tally.packets += 1
                 return self._receive(said)
         except WireError as fault:
-            self.tally.packets += 1
+            self.tally.packets += said is None
             self.tally.packets_bad += 1
             self.last_fault = fault
-            return []
-        if said is None:
+        if not isinstance(said, DeviceInfo):
             return []
         self._said[packet.characteristic] = packet.data
         return self._describe(said)
@@ -127,6 +129,7 @@ class Tracker:
             "cadence": self._cadence.snapshot(),
             "boot": self._boot,
             "next_index": self._next_index,
+            "counter_faults": dict(self.counter_faults),
             "held": dataclasses.asdict(self._held) if self._held else None,
             "timebase": self._timebase.snapshot() if self._timebase else None,
             "counters": {name: counter.snapshot() for name, counter in self._counters.items()},
@@ -144,6 +147,7 @@ class Tracker:
         self.steps, self.steps_now = dict(state["steps"]), state["steps_now"]
         self._cadence.restore(state["cadence"])
         self._boot, self._next_index = state["boot"], state["next_index"]
+        self.counter_faults = dict(state["counter_faults"])
         self._held = RawBlock(**state["held"]) if state["held"] else None
         self._timebase = Timebase.restored(state["timebase"]) if state["timebase"] else None
 
@@ -194,8 +198,12 @@ class Tracker:
             self.tally.samples_lost += gap.samples
             events.append(gap)
         pending = 0
-        for name, counter in self._counters.items():
-            update = counter.update(samples)
+        for name in [name for name in self._counters if name not in self.counter_faults]:
+            try:
+                update = self._counters[name].update(samples)
+            except CounterError as fault:
+                self.counter_faults[name] = str(fault)
+                continue
             events += self._confirm(name, update)
             if name == self.primary:
                 pending = update.pending

@@ -7,6 +7,7 @@ from fakes import MetronomeCounter, data_packet, data_packets, described
 from hypothesis import given
 from hypothesis import strategies as st
 
+from service.errors import CounterError
 from service.samples import Counting, Described, Gap, Packet, Rebooted, Signal, StepCounted
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
@@ -155,8 +156,24 @@ def test_samples_before_the_rate_are_bad_packets():
     tracker = make()
     scale = next(packet for packet in described() if packet.characteristic == wire.SCALE)
     run(tracker, [scale, data_packet(0)])
-    assert tracker.tally.packets_bad == 1
+    assert (tracker.tally.packets, tracker.tally.packets_bad) == (1, 1)
     assert "rate" in str(tracker.last_fault)
+
+
+class GyroscopeCounter(MetronomeCounter):
+    """A counter that needs what the device does not send."""
+
+    def update(self, block):
+        raise CounterError("needs a gyroscope")
+
+
+def test_a_counter_without_its_sensor_says_so_and_the_others_count_on():
+    counters = {"metronome": MetronomeCounter, "gyroscope": GyroscopeCounter}
+    tracker, plain = Tracker(wire.Bracelet(), counters, primary="metronome"), ready()
+    run(tracker, [*described(), *data_packets([10] * 10)])
+    run(plain, data_packets([10] * 10))
+    assert tracker.counter_faults == {"gyroscope": "needs a gyroscope"}
+    assert tracker.steps == {**plain.steps, "gyroscope": 0}
 
 
 def test_a_device_is_described_once_a_change():
