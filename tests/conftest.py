@@ -5,6 +5,13 @@ from pathlib import Path
 from typing import NoReturn
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# A loaded machine is no failure; and CI tries the same examples every time, developers new ones.
+settings.register_profile(
+    "steplink", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=os.environ.get("CI") == "true"
+)
+settings.load_profile("steplink")
 
 
 def missing(what: str) -> NoReturn:

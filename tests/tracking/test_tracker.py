@@ -164,7 +164,7 @@ class GyroscopeCounter(MetronomeCounter):
     """A counter that needs what the device does not send."""
 
     def update(self, block):
-        raise CounterError("needs a gyroscope")
+        raise CounterError(f"needs a gyroscope, not {len(block)} samples of acceleration")
 
 
 def test_a_counter_without_its_sensor_says_so_and_the_others_count_on():
@@ -172,7 +172,7 @@ def test_a_counter_without_its_sensor_says_so_and_the_others_count_on():
     tracker, plain = Tracker(wire.Bracelet(), counters, primary="metronome"), ready()
     run(tracker, [*described(), *data_packets([10] * 10)])
     run(plain, data_packets([10] * 10))
-    assert tracker.counter_faults == {"gyroscope": "needs a gyroscope"}
+    assert tracker.counter_faults == {"gyroscope": "needs a gyroscope, not 10 samples of acceleration"}
     assert tracker.steps == {**plain.steps, "gyroscope": 0}
 
 
