@@ -119,8 +119,13 @@ class Central:
         self._listeners.remove(listener)
         async with self._scanning:
             device = self._device
-            if device is not None and not self._device_lost() and not self._listeners and device.is_scanning:
+            if device is None or self._device_lost() or self._listeners or not device.is_scanning:
+                return
+            try:
                 await self._command(device.stop_scanning())
+            except BleakError:
+                if not self._device_lost():  # where it is, nothing scans any more
+                    raise
 
     async def _open(self) -> Device:
         transport = await self._attachment.enter_async_context(self._air.attach(self._name))

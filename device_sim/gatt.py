@@ -23,6 +23,8 @@ from service.errors import LinkError, ParameterError
 
 REOPEN_S: Final = 0.5
 """How long a bracelet waits before it looks for a lost air again."""
+TURN_SAMPLES: Final = 5000
+"""What is measured at once at most: a speed beyond the machine's lags, and does not block it."""
 
 
 class Start(StrEnum):
@@ -227,7 +229,7 @@ class GattBracelet:
         measured = 0
         while not self.bracelet.ended:
             due = int((loop.time() - began) * rate_hz + 1e-6)
-            measured += self.bracelet.measure(due - measured)
+            measured += self.bracelet.measure(min(due - measured, TURN_SAMPLES))
             await self._send()
             full = measured + max(1, self.bracelet.wanting(self._mtu))
             await asyncio.sleep(max(0.0, began + full / rate_hz - loop.time()))

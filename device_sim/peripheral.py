@@ -185,13 +185,14 @@ class Peripheral:
     async def _hci(self, command: Coroutine[Any, Any, object]) -> None:
         """Carry a command through; LinkError where the controller fails, nothing where the air is lost."""
         try:
-            (await self._operations.run(command, HCI_TIMEOUT_S)).result()
-        except (TimeoutError, BaseBumbleError, asyncio.CancelledError) as error:
-            if self._lost.done():
-                return  # `serve` ends by itself
-            if isinstance(error, asyncio.CancelledError):
-                raise
-            raise LinkError(LinkFault.NO_ADAPTER, f"the bracelet's controller does not answer: {error!r}") from error
+            task = await self._operations.run(command, HCI_TIMEOUT_S)
+            failed = task.cancelled() or isinstance(task.exception(), BaseBumbleError)
+        except TimeoutError:
+            failed = True
+        if not failed:
+            task.result()
+        elif not self._lost.done():  # where it is, `serve` ends by itself
+            raise LinkError(LinkFault.NO_ADAPTER, "the bracelet's controller does not answer")
 
     def _on_connection(self, link: Connection) -> None:
         self._link = link
