@@ -121,18 +121,15 @@ async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
 
 
 def _supervisor(settings: Settings, backend: Backend, wanted: Sequence[str] | None) -> Supervisor:
-    from service.counters.registry import make  # noqa: PLC0415
     from service.pipeline.hub import Hub  # noqa: PLC0415
+    from service.pipeline.lineup import lineup  # noqa: PLC0415
     from service.pipeline.supervisor import Supervisor  # noqa: PLC0415
-    from service.tracking.tracker import Tracker  # noqa: PLC0415
     from service.wearables.bracelet import Bracelet  # noqa: PLC0415
 
-    name, preset = settings.counter, settings.preset
-    make(name, preset=preset)  # a wrong name is told now, not at the first device
     return Supervisor(
         hub=Hub(durable_limit=settings.durable_limit),
         make_wearable=Bracelet,
-        make_tracker=lambda wearable: Tracker(wearable, {name: lambda: make(name, preset=preset)}, primary=name),
+        lineup=lineup(settings.counter, beside=settings.beside, preset=settings.preset, params=settings.param),
         wanted=wanted or None,
         backend=backend,
     )
@@ -226,12 +223,14 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
     for field in dataclasses.fields(Settings):
         meta = field.metadata
         span = f", {meta['low']}–{meta['high']} {meta['unit']}" if meta["low"] is not None else ""
+        repeated = isinstance(field.default, tuple)
         parser.add_argument(
             f"--{field.name.replace('_', '-')}",
-            type=type(field.default),
-            default=field.default,
+            type=str if repeated else type(field.default),
+            action="append" if repeated else "store",
+            default=[] if repeated else field.default,
             metavar=(meta["unit"] or "TEXT").upper(),
-            help=f"{meta['text']}{span} (default {field.default})",
+            help=f"{meta['text']}{span} (default {'none' if repeated else field.default})",
         )
 
 

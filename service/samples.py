@@ -173,6 +173,14 @@ class Rebooted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Segmented:
+    """Durable: from now on `primary` counts the device's steps; `steps` is the device's count so far."""
+
+    primary: str
+    steps: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Described:
     """The device said something of itself (identity, rate, scale, battery)."""
 
@@ -198,4 +206,4 @@ class Counting:
     cadence_spm: float | None
 
 
-Event = StepCounted | Gap | Rebooted | Described | Signal | Counting
+Event = StepCounted | Gap | Rebooted | Segmented | Described | Signal | Counting

@@ -14,6 +14,7 @@ from service.api.server import address, listen, serve
 from service.counters.registry import DEFAULT, make
 from service.links.ble import Backend
 from service.pipeline.hub import Hub
+from service.pipeline.lineup import lineup
 from service.pipeline.supervisor import Supervisor
 from service.tracking.tracker import Tracker
 from service.wearables.bracelet import Bracelet as Protocol
@@ -55,13 +56,13 @@ def default_tracker(wearable):
 
 
 @contextlib.asynccontextmanager
-async def staged(bracelet, *, durable_limit=1000, wanted=None, **radio):
+async def staged(bracelet, *, durable_limit=1000, wanted=None, beside=(), **radio):
     """Run the service over a bracelet on a local air; everything is closed and joined at the end."""
     async with LocalAir() as air, air.bracelet(bracelet, **radio) as gatt, air.central() as central:
         supervisor = Supervisor(
             hub=Hub(durable_limit=durable_limit),
             make_wearable=Protocol,
-            make_tracker=default_tracker,
+            lineup=lineup(DEFAULT, beside=beside),
             wanted=wanted,
             backend=Backend(scanner=central.scanner, client=central.client),
         )

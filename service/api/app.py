@@ -15,11 +15,11 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import TypeAdapter
 
 from service.api import models
-from service.api.devices import add_device_routes
+from service.api.devices import add_counter_routes, add_device_routes
 from service.api.guard import Guard
 from service.api.live import serve_feed
 from service.config import LOOPBACK
-from service.errors import ParameterError, UnknownDeviceError
+from service.errors import CounterError, ParameterError, UnknownDeviceError
 from service.pipeline.supervisor import Supervisor
 
 WEB = Path(__file__).parent / "web"
@@ -48,8 +48,10 @@ def create_app(supervisor: Supervisor) -> FastAPI:
         middleware=[Middleware(Guard, hosts=frozenset(LOOPBACK))],
     )
     app.add_exception_handler(UnknownDeviceError, _not_found)
-    app.add_exception_handler(ParameterError, _unprocessable)
+    for fault in (ParameterError, CounterError):
+        app.add_exception_handler(fault, _unprocessable)
     add_device_routes(app, supervisor)
+    add_counter_routes(app, supervisor)
     _add_live(app, supervisor)
     _add_page(app)
     return app
@@ -70,8 +72,12 @@ def _add_live(app: FastAPI, supervisor: Supervisor) -> None:
         return TypeAdapter(models.LiveMessage).json_schema(mode="serialization")
 
     @app.websocket("/api/v1/live")
-    async def live(socket: WebSocket, device: Annotated[list[str] | None, Query()] = None) -> None:
-        await serve_feed(socket, supervisor, device or [])
+    async def live(
+        socket: WebSocket,
+        device: Annotated[list[str] | None, Query()] = None,
+        counters: Annotated[str | None, Query()] = None,
+    ) -> None:
+        await serve_feed(socket, supervisor, device or [], counters.split(",") if counters else [])
 
 
 def _add_page(app: FastAPI) -> None:

@@ -8,7 +8,9 @@ from fastapi import FastAPI, Query
 
 from service.api import models
 from service.api.steps import StepsQuery, list_page
-from service.api.views import device_view
+from service.api.views import counter_view, device_view, lineup_view
+from service.counters import registry
+from service.pipeline.lineup import CounterChoice, Lineup
 from service.pipeline.supervisor import Supervisor
 
 _UNKNOWN: dict[int | str, dict[str, Any]] = {404: {"model": models.Problem, "description": "No device of that id"}}
@@ -52,3 +54,27 @@ def add_device_routes(app: FastAPI, supervisor: Supervisor) -> None:
     async def list_steps(id: str, query: Annotated[StepsQuery, Query()]) -> models.Page[models.StepEvent]:  # noqa: A002
         """List a device's confirmed steps, oldest first."""
         return list_page(supervisor.device(id), query)
+
+
+def add_counter_routes(app: FastAPI, supervisor: Supervisor) -> None:
+    """Add the routes of counters and of a device's lineup to `app`."""
+
+    @app.get("/api/v1/counters", tags=["counters"])
+    async def list_counters() -> models.Page[models.CounterModel]:
+        """List every counter with its parameters, their units, ranges and presets."""
+        return models.Page(items=[counter_view(kind) for kind in registry.COUNTERS.values()])
+
+    @app.get("/api/v1/devices/{id}/counters", tags=["counters"], responses=_UNKNOWN)
+    async def get_lineup(id: str) -> models.LineupModel:  # noqa: A002
+        """Tell which counters run on a device's stream, the primary first."""
+        return lineup_view(supervisor.device(id).lineup)
+
+    @app.put("/api/v1/devices/{id}/counters", tags=["counters"], responses=_UNKNOWN)
+    async def put_lineup(id: str, wanted: models.LineupModel) -> models.LineupModel:  # noqa: A002
+        """Let these counters run from now on; another primary begins a new segment, and `steps` goes on."""
+        device = supervisor.device(id)
+        choices = [
+            CounterChoice(name=choice.name, preset=choice.preset, overrides=choice.params) for choice in wanted.counters
+        ]
+        device.count_with(Lineup(choices=tuple(choices)))
+        return lineup_view(device.lineup)

@@ -9,34 +9,44 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from fastapi import WebSocket, WebSocketDisconnect
 
 from service.api import models
 from service.api.views import device_view, event_view, utc
+from service.counters import registry
 from service.errors import UnknownDeviceError
 from service.pipeline.hub import SlowSubscriberError, Subscription
 from service.pipeline.supervisor import Supervisor
+from service.samples import StepCounted
 
-CLOSE_UNKNOWN_DEVICE = 4404
+CLOSE_UNKNOWN = 4404
 CLOSE_SLOW = 4408
 SEND_TIMEOUT_S = 10.0
 """A client whose socket takes nothing for so long is gone."""
 
 
-async def serve_feed(socket: WebSocket, supervisor: Supervisor, wanted: Sequence[str]) -> None:
-    """Serve one client until it goes or falls behind. `wanted` are device ids or addresses; empty means all."""
+async def serve_feed(
+    socket: WebSocket, supervisor: Supervisor, wanted: Sequence[str], counters: Sequence[str] = ()
+) -> None:
+    """Serve one client until it goes or falls behind.
+
+    `wanted` are device ids or addresses, `counters` names whose steps are told; empty means all.
+    """
     await socket.accept()
     try:
         devices = [supervisor.device(key) for key in wanted] if wanted else supervisor.devices
     except UnknownDeviceError as error:
-        await socket.close(CLOSE_UNKNOWN_DEVICE, str(error)[:120])
+        await socket.close(CLOSE_UNKNOWN, str(error)[:120])
+        return
+    if unknown := [name for name in counters if name not in registry.COUNTERS]:
+        await socket.close(CLOSE_UNKNOWN, f"no counter {', '.join(unknown)}: see /api/v1/counters"[:120])
         return
     keys = {key for device in devices for key in (device.id, device.address)} if wanted else None
     subscription = supervisor.hub.subscribe(keys)
     snapshot = models.Snapshot(at=utc(time.time_ns()), devices=[device_view(device) for device in devices])
-    sender = asyncio.create_task(_send(socket, subscription, supervisor, snapshot))
+    sender = asyncio.create_task(_send(socket, subscription, supervisor, snapshot, frozenset(counters)))
     receiver = asyncio.create_task(_receive(socket))
     try:
         await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
@@ -48,13 +58,19 @@ async def serve_feed(socket: WebSocket, supervisor: Supervisor, wanted: Sequence
 
 
 async def _send(
-    socket: WebSocket, subscription: Subscription, supervisor: Supervisor, snapshot: models.Snapshot
+    socket: WebSocket,
+    subscription: Subscription,
+    supervisor: Supervisor,
+    snapshot: models.Snapshot,
+    counters: Collection[str],
 ) -> None:
     with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
         await _send_text(socket, snapshot.model_dump_json())
         try:
             while True:
                 for notice in await subscription.receive():
+                    if counters and isinstance(notice.event, StepCounted) and notice.event.counter not in counters:
+                        continue
                     await _send_text(socket, event_view(notice, supervisor).model_dump_json())
         except SlowSubscriberError:
             last = models.Lagging(detail="too slow: subscribe again, the snapshot has every count")

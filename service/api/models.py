@@ -39,7 +39,10 @@ class Device(BaseModel):
     primary: str = Field(description="Counter whose count `steps` is", examples=["double_threshold"])
     steps: int = Field(description="Confirmed steps since the session began; never falls", examples=[128])
     steps_now: int = Field(description="`steps` plus those that are likely; may fall", examples=[130])
-    counters: dict[str, int] = Field(description="Confirmed steps by counter", examples=[{"double_threshold": 128}])
+    counters: dict[str, int] = Field(
+        description="Each counter's own confirmed steps since it began", examples=[{"double_threshold": 128}]
+    )
+    counter_faults: dict[str, str] = Field(description="Why a counter does not count: a sensor the device lacks")
     cadence_spm: float | None = Field(description="Steps a minute; null while nobody walks", examples=[108.4])
     battery_percent: int | None = Field(examples=[87])
     rate_hz: float | None = Field(description="Nominal sampling rate", examples=[50.0])
@@ -110,6 +113,14 @@ class RebootEvent(_Durable):
     previous: int
 
 
+class SegmentEvent(_Durable):
+    """From now on another counter, or other parameters of it, count the device's steps."""
+
+    type: Literal["segment"] = "segment"
+    primary: str = Field(examples=["autocorrelation"])
+    steps: int = Field(description="The device's steps so far")
+
+
 class BandModel(BaseModel):
     """Both thresholds over a window of device time."""
 
@@ -162,10 +173,59 @@ class Lagging(BaseModel):
 
 
 LiveMessage = Annotated[
-    StepEvent | StateEvent | GapEvent | RebootEvent | SignalEvent | CountingEvent | DeviceEvent | Snapshot | Lagging,
+    StepEvent
+    | StateEvent
+    | GapEvent
+    | RebootEvent
+    | SegmentEvent
+    | SignalEvent
+    | CountingEvent
+    | DeviceEvent
+    | Snapshot
+    | Lagging,
     Field(discriminator="type"),
 ]
-DurableEvent = Annotated[StepEvent | StateEvent | GapEvent | RebootEvent, Field(discriminator="type")]
+DurableEvent = Annotated[StepEvent | StateEvent | GapEvent | RebootEvent | SegmentEvent, Field(discriminator="type")]
+
+
+class ParameterModel(BaseModel):
+    """One parameter of a counter: a number with unit and range, or one of a few words."""
+
+    name: str = Field(examples=["rest_raw"])
+    text: str = Field(description="What it does")
+    unit: str | None
+    low: float | None = Field(description="Smallest value, inclusive")
+    high: float | None = Field(description="Largest value, inclusive")
+    options: list[str] | None = Field(description="The words it takes")
+    presets: dict[str, float | str] = Field(
+        description="Its value in each preset", examples=[{"paper": 1.0, "tuned": 5.75}]
+    )
+
+
+class CounterModel(BaseModel):
+    """A counter that can be asked for."""
+
+    name: str = Field(examples=["double_threshold"])
+    sensors: list[str] = Field(examples=[["accelerometer"]])
+    parameters: list[ParameterModel]
+
+
+class ChoiceModel(BaseModel):
+    """A counter, its preset, and the parameters that differ from it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: str = Field(examples=["double_threshold"])
+    preset: str = Field(default="tuned", description="paper or tuned")
+    params: dict[str, float | str] = Field(default_factory=dict, examples=[{"rest_raw": 4.0}])
+
+
+class LineupModel(BaseModel):
+    """The counters of a device, the primary first: its count is the device's `steps`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    counters: list[ChoiceModel] = Field(min_length=1, max_length=16)
 
 
 class Health(BaseModel):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 from service.api import models
+from service.counters.registry import CounterKind
 from service.pipeline.device import Device
+from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged, Notice, StateChanged
 from service.pipeline.supervisor import Supervisor
-from service.samples import Band, Counting, Gap, Rebooted, Signal, StepCounted
+from service.samples import Band, Counting, Gap, Rebooted, Segmented, Signal, StepCounted
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SIGNAL_DIGITS = 4
@@ -33,9 +37,10 @@ def device_view(device: Device) -> models.Device:
         since=utc(device.since_ns),
         session_since=utc(session.since_ns),
         primary=tracker.primary,
-        steps=tracker.steps[tracker.primary],
+        steps=tracker.total,
         steps_now=tracker.steps_now,
         counters=tracker.steps,
+        counter_faults=tracker.counter_faults,
         cadence_spm=tracker.cadence_spm,
         battery_percent=info.battery_percent,
         rate_hz=info.rate_hz,
@@ -64,7 +69,7 @@ def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:
     return durable_view(notice)
 
 
-def durable_view(notice: Notice) -> models.StepEvent | models.StateEvent | models.GapEvent | models.RebootEvent:
+def durable_view(notice: Notice) -> models.DurableEvent:
     """Return a durable notice as an event."""
     device, at, ordinal, event = notice.device, utc(notice.at_ns), notice.ordinal or 0, notice.event
     match event:
@@ -84,6 +89,8 @@ def durable_view(notice: Notice) -> models.StepEvent | models.StateEvent | model
             )
         case Rebooted(boot=boot, previous=previous):
             return models.RebootEvent(device=device, at=at, ordinal=ordinal, boot=boot, previous=previous)
+        case Segmented(primary=primary, steps=steps):
+            return models.SegmentEvent(device=device, at=at, ordinal=ordinal, primary=primary, steps=steps)
         case _:
             raise TypeError(f"{event!r} is not durable")
 
@@ -109,6 +116,36 @@ def step_view(notice: Notice) -> models.StepEvent:
         upper=step.upper,
         lower=step.lower,
     )
+
+
+def counter_view(kind: CounterKind) -> models.CounterModel:
+    """Return a counter of the registry with its parameters."""
+    parameters = [_parameter_view(field, kind) for field in dataclasses.fields(kind.params)]
+    return models.CounterModel(name=kind.name, sensors=sorted(kind.sensors), parameters=parameters)
+
+
+def _parameter_view(field: dataclasses.Field[Any], kind: CounterKind) -> models.ParameterModel:
+    meta = field.metadata
+    return models.ParameterModel(
+        name=field.name,
+        text=meta["text"],
+        unit=meta.get("unit"),
+        low=meta.get("low"),
+        high=meta.get("high"),
+        options=list(meta["options"]) if "options" in meta else None,
+        presets={preset: getattr(params, field.name) for preset, params in kind.presets.items()},
+    )
+
+
+def lineup_view(lineup: Lineup) -> models.LineupModel:
+    """Return a device's counters as they can be put back."""
+    choices = [
+        models.ChoiceModel.model_validate(
+            {"name": choice.name, "preset": choice.preset, "params": dict(choice.overrides)}
+        )
+        for choice in lineup.choices
+    ]
+    return models.LineupModel(counters=choices)
 
 
 def _ephemeral_view(notice: Notice, event: Signal | Counting) -> models.SignalEvent | models.CountingEvent:

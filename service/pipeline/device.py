@@ -11,6 +11,7 @@ from service.errors import LinkError
 from service.links.ble import Sighting
 from service.links.contract import Link
 from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State, advance, backoff_s
+from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Publish, Session
 from service.tracking.tracker import Tracker
@@ -22,11 +23,13 @@ logger = logging.getLogger(__name__)
 class Device:
     """One device, from the first time it is heard."""
 
-    def __init__(self, sighting: Sighting, wearable: Wearable, tracker: Tracker, publish: Publish) -> None:
+    def __init__(self, sighting: Sighting, wearable: Wearable, lineup: Lineup, publish: Publish) -> None:
         self.address = sighting.address
         self.name = sighting.name
         self.rssi_dbm: int | None = sighting.rssi_dbm
         self.wearable = wearable
+        self.lineup = lineup
+        tracker = Tracker(wearable, lineup.makers, primary=lineup.primary)
         self.session = Session(lambda: self.id, tracker, publish)
         self.state = State.SEEN
         self.reason: str | None = None
@@ -47,6 +50,11 @@ class Device:
     def is_due(self) -> bool:
         """Whether an advertisement should start an attempt now."""
         return self.wanted and self.state in WAITING and time.monotonic() >= self.not_before_s
+
+    def count_with(self, lineup: Lineup) -> None:
+        """Go on with these counters."""
+        self.lineup = lineup
+        self.session.change_counters(lineup)
 
     def heard(self, sighting: Sighting, *, tell_every_s: float) -> None:
         """Take an advertisement."""

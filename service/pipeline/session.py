@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from service.links.contract import Link
 from service.pipeline.lifecycle import State
+from service.pipeline.lineup import Lineup
 from service.pipeline.notices import EPHEMERAL, DeviceChanged, Notice, StateChanged, Told
 from service.samples import Described, Event, Gap, Packet, Rebooted, StepCounted
 from service.signals.hosttime import HostClock
@@ -63,6 +64,12 @@ class Session:
         if abs(packet.at_ns - self._told_ns) >= TELL_EVERY_NS:
             self._told_ns = packet.at_ns
             self.tell(DeviceChanged(), packet.at_ns)
+
+    def change_counters(self, lineup: Lineup) -> None:
+        """Go on with other counters, and tell what that decided."""
+        for event in self.tracker.change_counters(lineup.makers, primary=lineup.primary):
+            self.tell(event, self._host_ns(event))
+        self.tell(DeviceChanged(), time.time_ns())
 
     def state_changed(self, state: State, reason: str | None) -> None:
         """Tell that the device's connection came into another state."""

@@ -18,7 +18,7 @@ from service.links.ble import PLATFORM, Backend, BleLink, Sighting, scanning
 from service.pipeline.device import Device
 from service.pipeline.hub import Hub
 from service.pipeline.lifecycle import Cause
-from service.tracking.tracker import Tracker
+from service.pipeline.lineup import Lineup
 from service.wearables.contract import Wearable
 
 SCANNER_RETRY_S = 2.0
@@ -30,14 +30,12 @@ SEEN_EVERY_S = 5.0
 
 logger = logging.getLogger(__name__)
 
-TrackerFactory = Callable[[Wearable], Tracker]
-
 
 class Supervisor:
     """All devices and their connections.
 
     `wanted` holds names and addresses to connect to as soon as they are heard; None means every device of a known
-    kind. `make_wearable` gives the protocol, `make_tracker` the counters of a new device.
+    kind. `make_wearable` gives the protocol, `lineup` the counters of a new device.
     """
 
     def __init__(
@@ -45,7 +43,7 @@ class Supervisor:
         *,
         hub: Hub,
         make_wearable: Callable[[], Wearable],
-        make_tracker: TrackerFactory,
+        lineup: Lineup,
         wanted: Collection[str] | None = None,
         backend: Backend = PLATFORM,
     ) -> None:
@@ -53,7 +51,7 @@ class Supervisor:
         self.trouble: LinkError | None = None
         """Why nothing can be heard at the moment; None while the scanner works."""
         self._make_wearable = make_wearable
-        self._make_tracker = make_tracker
+        self._lineup = lineup
         self._wanted = None if wanted is None else frozenset(word.casefold() for word in wanted)
         self._backend = backend
         self._devices: dict[str, Device] = {}
@@ -125,7 +123,7 @@ class Supervisor:
         device = self._devices.get(sighting.address)
         if device is None:
             wearable = self._make_wearable()
-            device = Device(sighting, wearable, self._make_tracker(wearable), self.hub.publish)
+            device = Device(sighting, wearable, self._lineup, self.hub.publish)
             device.wanted = self._is_wanted(sighting)
             self._devices[sighting.address] = device
         device.heard(sighting, tell_every_s=SEEN_EVERY_S)

@@ -24,6 +24,7 @@ from service.samples import (
     Packet,
     RawBlock,
     Rebooted,
+    Segmented,
     Signal,
     StepCounted,
     Update,
@@ -66,6 +67,8 @@ class Tracker:
         self.tally = Tally()
         self.steps = dict.fromkeys(counters, 0)
         self.steps_now = 0
+        self._segment = (0, 0)
+        """The device's steps when the primary took over, and the primary's own count then."""
         self.last_fault: WireError | None = None
         self.counter_faults: dict[str, str] = {}
         """Why a counter does not count, as a sentence: a sensor that the device does not send."""
@@ -85,6 +88,12 @@ class Tracker:
     def now_s(self) -> float:
         """Device time of the newest sample, seconds after boot."""
         return self._timebase.now_s if self._timebase else 0.0
+
+    @property
+    def total(self) -> int:
+        """The device's confirmed steps: the primary's of each segment, added up; never falls."""
+        before, own = self._segment
+        return before + self.steps[self.primary] - own
 
     @property
     def cadence_spm(self) -> float | None:
@@ -113,6 +122,25 @@ class Tracker:
         self._said[packet.characteristic] = packet.data
         return self._describe(said)
 
+    def change_counters(self, counters: Mapping[str, CounterFactory], *, primary: str) -> list[Event]:
+        """Go on with other counters: equal ones as they are, the others afresh from the next sample on.
+
+        Another primary, or other parameters of it, begin a new segment of the device's count.
+        """
+        kept = {name for name, make in counters.items() if self._factories.get(name) == make}
+        dropped = [name for name in self._counters if name not in kept]
+        events = [event for name in dropped for event in self._confirm(name, self._counters[name].finish())]
+        before = self.total
+        self.steps = {name: self.steps[name] if name in kept else 0 for name in counters}
+        self._counters = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
+        self.counter_faults = {name: why for name, why in self.counter_faults.items() if name in kept}
+        self._factories = dict(counters)
+        if primary == self.primary and primary in kept:
+            return events
+        self.primary, self._segment = primary, (before, self.steps[primary])
+        self._cadence = Cadence()
+        return [*events, Segmented(primary=primary, steps=before), self._counting(0)]
+
     def finish(self) -> list[Event]:
         """End the stream: decide what is still pending."""
         events = self._finish_counters()
@@ -126,6 +154,7 @@ class Tracker:
             "tally": dataclasses.asdict(self.tally),
             "steps": dict(self.steps),
             "steps_now": self.steps_now,
+            "segment": list(self._segment),
             "cadence": self._cadence.snapshot(),
             "boot": self._boot,
             "next_index": self._next_index,
@@ -145,6 +174,8 @@ class Tracker:
             counter.restore(state["counters"][name])
         self.tally = Tally(**state["tally"])
         self.steps, self.steps_now = dict(state["steps"]), state["steps_now"]
+        before, own = state["segment"]
+        self._segment = (before, own)
         self._cadence.restore(state["cadence"])
         self._boot, self._next_index = state["boot"], state["next_index"]
         self.counter_faults = dict(state["counter_faults"])
@@ -271,7 +302,7 @@ class Tracker:
         return [event for name, counter in self._counters.items() for event in self._confirm(name, counter.finish())]
 
     def _counting(self, pending: int) -> Counting:
-        steps = self.steps[self.primary]
+        steps = self.total
         self.steps_now = steps + pending
         return Counting(now_s=self.now_s, steps=steps, steps_now=self.steps_now, cadence_spm=self.cadence_spm)
 

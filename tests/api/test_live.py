@@ -133,7 +133,7 @@ async def test_our_own_page_may_connect(walk):
 async def test_every_event_has_a_schema_and_openapi_has_examples(walk):
     schema = (await walk.http.get("api/v1/live/schema")).json()
     kinds = set(schema["discriminator"]["mapping"])
-    assert kinds == {"snapshot", "step", "state", "gap", "reboot", "signal", "counting", "device", "lagging"}
+    assert kinds == {"snapshot", "step", "state", "gap", "reboot", "segment", "signal", "counting", "device", "lagging"}
     openapi = (await walk.http.get("openapi.json")).json()
     device = openapi["components"]["schemas"]["Device"]["properties"]
     assert device["id"]["examples"]

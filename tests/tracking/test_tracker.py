@@ -1,6 +1,7 @@
 """The Tracker: a pure fold over packets. Bad, repeated, late and absent ones are counted, and none stops it."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from fakes import MetronomeCounter, data_packet, data_packets, described
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.errors import CounterError
-from service.samples import Counting, Described, Gap, Packet, Rebooted, Signal, StepCounted
+from service.samples import Counting, Described, Gap, Packet, Rebooted, Segmented, Signal, StepCounted
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 
@@ -194,3 +195,44 @@ def test_snapshot_and_restore_at_any_packet(cut):
     after = run(second, packets[cut:])
     assert steps(before + after) == steps(expected)
     assert json.dumps(second.snapshot()) == json.dumps(whole.snapshot())
+
+
+class Half(MetronomeCounter):
+    """Counts every other step of the metronome."""
+
+    def update(self, block):
+        update = super().update(block)
+        return replace(update, steps=tuple(step for step in update.steps if round(step.at_s * 2) % 2 == 0))
+
+
+def test_counters_run_side_by_side_on_one_stream():
+    tracker = Tracker(wire.Bracelet(), {"metronome": MetronomeCounter, "half": Half}, primary="metronome")
+    events = run(tracker, [*described(), *data_packets([10] * 20)])
+    assert tracker.steps == {"metronome": 8, "half": 4}
+    assert [event.steps for event in only(events, StepCounted) if event.counter == "half"] == [1, 2, 3, 4]
+    assert tracker.total == 8
+
+
+def test_another_primary_begins_a_segment_and_the_count_goes_on():
+    tracker = ready()
+    run(tracker, data_packets([10] * 10))
+    events = tracker.change_counters({"half": Half, "metronome": MetronomeCounter}, primary="half")
+    assert only(events, Segmented) == [Segmented(primary="half", steps=4)]
+    assert tracker.total == 4
+    run(tracker, data_packets([10] * 10, start=100))
+    assert tracker.steps == {"half": 2, "metronome": 8}
+    assert tracker.total == 6
+    run(tracker, [])
+    tracker.change_counters({"metronome": MetronomeCounter, "half": Half}, primary="metronome")
+    run(tracker, data_packets([10] * 10, start=200))
+    assert tracker.total == 10
+
+
+def test_a_counter_that_stays_goes_on_without_a_break():
+    changed, plain = ready(), ready()
+    run(plain, data_packets([10] * 20))
+    run(changed, data_packets([10] * 7))
+    events = changed.change_counters({"metronome": MetronomeCounter, "half": Half}, primary="metronome")
+    run(changed, data_packets([10] * 13, start=70))
+    assert only(events, Segmented) == []
+    assert changed.steps["metronome"] == plain.steps["metronome"]

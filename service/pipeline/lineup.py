@@ -1,0 +1,66 @@
+"""Which counters run on a device's stream, with which parameters, and whose count is the device's `steps`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from service.counters import registry
+from service.counters.contract import StepCounter
+from service.errors import ParameterError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CounterChoice:
+    """A counter of the registry with a preset and overrides; called, it makes one. Checked when it is made."""
+
+    name: str
+    preset: str = "tuned"
+    overrides: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        registry.parameters(self.name, self.preset, self.overrides)
+
+    def __call__(self) -> StepCounter:
+        """Return a fresh counter."""
+        return registry.make(self.name, self.preset, self.overrides)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lineup:
+    """The counters of one device: the primary first, each name once."""
+
+    choices: tuple[CounterChoice, ...]
+
+    def __post_init__(self) -> None:
+        names = [choice.name for choice in self.choices]
+        if not names:
+            raise ParameterError("counters", names, "at least one counter")
+        if len(set(names)) < len(names):
+            raise ParameterError("counters", names, "each counter once")
+
+    @property
+    def primary(self) -> str:
+        """Name of the counter whose count is the device's."""
+        return self.choices[0].name
+
+    @property
+    def makers(self) -> dict[str, CounterChoice]:
+        """What makes each counter, by name."""
+        return {choice.name: choice for choice in self.choices}
+
+
+def lineup(primary: str, *, beside: Iterable[str] = (), preset: str = "tuned", params: Sequence[str] = ()) -> Lineup:
+    """Return the lineup that a command line asks for; `params` are NAME.KEY=VALUE.
+
+    CounterError and ParameterError name what is unknown, wrong or out of range.
+    """
+    names = list(dict.fromkeys([primary, *beside]))
+    overrides: dict[str, dict[str, object]] = {name: {} for name in names}
+    for text in params:
+        path, equals, value = text.partition("=")
+        name, dot, key = path.partition(".")
+        if not (equals and dot and key) or name not in overrides:
+            raise ParameterError("param", text, f"NAME.KEY=VALUE with NAME one of {', '.join(names)}")
+        overrides[name][key] = value
+    return Lineup(choices=tuple(CounterChoice(name=name, preset=preset, overrides=overrides[name]) for name in names))

@@ -1,0 +1,78 @@
+"""Counters over the API: what there is, what runs on a device, and changing it while it streams."""
+
+import asyncio
+import json
+
+import pytest
+import pytest_asyncio
+import websockets
+from stage import staged
+
+from device_sim.bracelet import Bracelet
+from device_sim.gait import Walker
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def walk():
+    async with staged(Bracelet(Walker("normal:600", seed=3)), speed=8) as stage:
+        await stage.until(lambda device: device["steps"] > 0)
+        yield stage
+
+
+async def test_every_counter_tells_its_parameters_with_unit_range_and_presets(walk):
+    items = (await walk.http.get("api/v1/counters")).json()["items"]
+    (double,) = [item for item in items if item["name"] == "double_threshold"]
+    rest = {parameter["name"]: parameter for parameter in double["parameters"]}["rest_raw"]
+    assert (rest["unit"], rest["low"], rest["high"]) == ("raw units", 0, 64)
+    assert rest["presets"] == {"paper": 1.0, "tuned": 5.75}
+    assert all(p["text"] and (p["options"] or p["unit"]) for item in items for p in item["parameters"])
+
+
+async def test_other_parameters_begin_a_segment_and_the_count_never_falls(walk):
+    lineup = (await walk.http.get("api/v1/devices/sim-1/counters")).json()
+    assert lineup == {"counters": [{"name": "double_threshold", "preset": "tuned", "params": {}}]}
+    async with walk.live() as feed:
+        before = (await walk.device())["steps"]
+        wanted = {"counters": [{"name": "double_threshold", "preset": "tuned", "params": {"bout": 3}}]}
+        answer = await walk.http.put("api/v1/devices/sim-1/counters", json=wanted)
+        assert answer.json() == wanted
+        async with asyncio.timeout(10):
+            while (message := json.loads(await feed.recv()))["type"] != "segment":
+                pass
+        assert message["primary"] == "double_threshold"
+        assert message["steps"] >= before
+    device = await walk.until(lambda device: device["steps"] > message["steps"])
+    assert device["counters"]["double_threshold"] == device["steps"] - message["steps"]
+
+
+@pytest.mark.parametrize(
+    ("counters", "said"),
+    [
+        ([], "at least 1"),
+        ([{"name": "abacus"}], "abacus"),
+        ([{"name": "double_threshold", "preset": "magic"}], "magic"),
+        ([{"name": "double_threshold", "params": {"bout": 99}}], "from 2 to 12"),
+        ([{"name": "double_threshold", "params": {"beads": 1}}], "no such parameter"),
+        ([{"name": "double_threshold"}, {"name": "double_threshold"}], "once"),
+    ],
+)
+async def test_a_wrong_lineup_is_refused_and_changes_nothing(walk, counters, said):
+    before = (await walk.http.get("api/v1/devices/sim-1/counters")).json()
+    answer = await walk.http.put("api/v1/devices/sim-1/counters", json={"counters": counters})
+    assert answer.status_code == 422
+    assert said in answer.text
+    assert (await walk.http.get("api/v1/devices/sim-1/counters")).json() == before
+
+
+async def test_the_feed_tells_steps_of_the_counters_asked_for(walk):
+    async with walk.live("?counters=double_threshold") as feed, asyncio.timeout(10):
+        while (message := json.loads(await feed.recv()))["type"] != "step":
+            pass
+        assert message["counter"] == "double_threshold"
+    with pytest.raises(websockets.ConnectionClosed) as closed:
+        async with walk.live("?counters=abacus") as feed:
+            await feed.recv()
+    assert closed.value.rcvd.code == 4404
+    assert "abacus" in closed.value.rcvd.reason
