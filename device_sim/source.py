@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from device_sim.gait import Walker
 from service.errors import ParameterError
-from service.recordings import Recording
+from service.recordings import Recording, evenly_spaced, stated_rate_hz
 
 __all__ = ["RecordingSource", "Samples", "Source", "WalkerSource"]
 
@@ -41,16 +41,17 @@ class Source(Protocol):
 class RecordingSource:
     """A recording laid on even times by linear interpolation, once or for ever.
 
-    `rate_hz` is the recording's own unless another is asked for. With `loop`, time and truth go on where the recording
-    begins again. Where only the number of steps is known, they are all credited at the end of each turn.
+    `rate_hz` is the recording's own, in whole hundredths, unless another is asked for. With `loop`, time and truth go
+    on where the recording begins again. Where only the number of steps is known, they are all credited at the end of
+    each turn.
     """
 
     def __init__(self, recording: Recording, *, loop: bool = False, rate_hz: float | None = None) -> None:
-        self._rate_hz = recording.rate_hz if rate_hz is None else rate_hz
+        self._rate_hz = stated_rate_hz(recording) if rate_hz is None else rate_hz
         if not 0 < self._rate_hz < float("inf"):
             raise ParameterError("rate_hz", rate_hz, "a rate above 0 is wanted")
         self._loop = loop
-        self._acc_g = _even(recording, self._rate_hz)
+        self._acc_g = evenly_spaced(recording, recording.acc_g, self._rate_hz)
         self._turn_s = len(self._acc_g) / self._rate_hz
         self._true_steps = recording.true_steps
         self._step_t_s: list[float] | None = None
@@ -83,11 +84,3 @@ class RecordingSource:
         if self._step_t_s is not None and (self._loop or not turns):
             in_turn = bisect.bisect_right(self._step_t_s, within_s)
         return turns * self._true_steps + in_turn
-
-
-def _even(recording: Recording, rate_hz: float) -> Samples:
-    """Return the recording's acceleration at k / rate_hz seconds after its first sample."""
-    t_s = recording.t_s - recording.t_s[0]
-    # A sample that rounding puts a hair behind the last one still belongs to the recording.
-    grid_s = np.arange(int(t_s[-1] * rate_hz + 1e-6) + 1) / rate_hz
-    return np.column_stack([np.interp(grid_s, t_s, recording.acc_g[:, axis]) for axis in range(3)])

@@ -138,6 +138,10 @@ class KernelCounter:
         self._kernel.stop(self._state)
         return rows.reshape(-1, self._kernel.row)
 
+    def read(self, rows: NDArray[np.float64]) -> tuple[Step, ...]:
+        """Return the steps that `count`'s rows say."""
+        return self._events(rows.ravel().tolist())[0]
+
     def _columns(self, block: SampleBlock) -> tuple[Column, ...]:
         columns: tuple[Column, ...] = ()
         for sensor in self._kernel.sensors:
