@@ -219,7 +219,7 @@ class BumbleClient(BaseBleakClient):
         if link.ended.is_set():
             return
         link.ended.set()
-        link.requests.cancel()  # those that wait for another's answer would wait for ever
+        link.requests.abandon()  # those that wait for another's answer would wait for ever
         if self._link is link:
             self._link = None
             self.services = None

@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Coroutine
 from typing import Any, Final, TypeVar
 
-CLOSE_S: Final = 0.5
+AGAIN_S: Final = 0.01
 """How long a cancelled operation may take before it is cancelled again."""
 SETTLE_S: Final = 0.1
 """A controller answers a command in about a millisecond."""
@@ -43,10 +43,16 @@ class Operations:
             raise TimeoutError(f"{self._name}: no answer in {timeout_s:g} s")
         return task
 
-    def cancel(self) -> None:
-        """Cancel what is left: nobody will answer it any more."""
+    def abandon(self) -> None:
+        """Cancel what is left, until it has ended: nobody will answer it any more.
+
+        Once is not enough: before Python 3.12 `wait_for` swallows a cancellation that comes with the answer, and what
+        has several requests to make goes on with the next.
+        """
         for task in self._tasks:
             task.cancel()
+        if self._tasks:
+            asyncio.get_running_loop().call_later(AGAIN_S, self.abandon)
 
     async def settle(self) -> None:
         """Wait a moment for answers that are on their way, while there is somebody to give them."""
@@ -54,10 +60,10 @@ class Operations:
             await asyncio.wait(set(self._tasks), timeout=SETTLE_S)
 
     async def close(self) -> None:
-        """Cancel what is left and wait for it."""
-        while self._tasks:  # once is not enough: wait_for swallows a cancellation that comes with the answer (< 3.12)
-            self.cancel()
-            await asyncio.wait(set(self._tasks), timeout=CLOSE_S)
+        """Abandon what is left and wait for it."""
+        self.abandon()
+        if self._tasks:
+            await asyncio.wait(set(self._tasks))
 
     def _finished(self, task: asyncio.Task[Any]) -> None:
         self._tasks.discard(task)

@@ -29,8 +29,8 @@ STALL_S: Final = 5.0
 """A host that takes no packet for so long has lost the link, as by a supervision timeout."""
 UNSENT_PACKETS: Final = 16
 """Packets the controller may hold before the sender waits for it."""
-ADVERTISING_INTERVAL_MS: Final = 62.5
-"""100 ms on the air: bumble's controller takes the 0.625 ms units for milliseconds."""
+ADVERTISING_INTERVAL_MS: Final = 31.25
+"""50 ms on the air: bumble's controller takes the 0.625 ms units for milliseconds."""
 NAME_BYTES: Final = 8
 """What 31 bytes hold beside flags and a 128-bit UUID; the link carries no scan response."""
 DEFAULT_MTU: Final = 23
