@@ -1,4 +1,4 @@
-"""A wearable whose packets carry every sensor unrounded: what a Tracker counts of it must equal a whole file's count."""
+"""A wearable whose packets carry every sensor unrounded: a Tracker must count of it what a whole file gives."""
 
 import struct
 from functools import partial
@@ -51,9 +51,7 @@ def packets(recording, n=10):
 
 def live_steps(recording, variants, n=10):
     """Times of the steps that a Tracker with these (counter, preset) confirms: {variant: [s, …]}."""
-    makers = {
-        f"{name} {preset}": lambda name=name, preset=preset: registry.make(name, preset) for name, preset in variants
-    }
+    makers = {" ".join(variant): partial(registry.make, *variant) for variant in variants}
     tracker = Tracker(Lossless(), makers, primary=next(iter(makers)))
     found = {variant: [] for variant in variants}
     events = [event for packet in packets(recording, n) for event in tracker.apply(packet)] + tracker.finish()
