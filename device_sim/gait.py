@@ -5,6 +5,10 @@ acceleration has four harmonics of the step rate, stronger for one foot; steps v
 numbers are in `gait_profiles`, each with the recordings it was measured on. Everything follows from the seed: the
 same walker gives the same samples, however they are asked for.
 
+`sensed` adds the angular rate and the Earth's field that the same attitude gives: on eth2023 the arm's main axis turns
+at 84°/s (median of 62 windows of 4 s, standard deviation), the normal row at 68; a second axis with half of that there
+is left out here.
+
 Left out: forward and sideways acceleration of the body, turns of the wearer, fatigue.
 """
 
@@ -13,18 +17,27 @@ from __future__ import annotations
 import bisect
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from device_sim.gait_courses import Course, Wearer, course
-from device_sim.gait_profiles import ARM_M, SENSOR_NOISE_G
+from device_sim.gait_profiles import (
+    ARM_M,
+    EARTH_UT,
+    GAITS,
+    SENSOR_NOISE_G,
+    SENSOR_NOISE_RAD_S,
+    SENSOR_NOISE_UT,
+    Gait,
+)
 from device_sim.gait_schedule import ACTIVITIES, Segment, parse_schedule
 from service.errors import ParameterError
 
-__all__ = ["ACTIVITIES", "Segment", "Walker", "parse_schedule"]
+__all__ = ["ACTIVITIES", "Segment", "Sensed", "Walker", "parse_schedule"]
 
 Floats = NDArray[np.float64]
 
@@ -32,13 +45,22 @@ _BLOCK: Final = 512
 """Samples made at a time: fixed, so that noise does not depend on how samples are asked for."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sensed:
+    """What a sensor with nine axes measures, each n×3 in its own axes."""
+
+    acc_g: Floats
+    gyro_rad_s: Floats
+    mag_ut: Floats
+
+
 class Walker:
     """Acceleration in g (n×3, gravity included) of somebody who follows `schedule`; a `device_sim.source.Source`.
 
     `gravity` is the direction, in the sensor's axes, of what it reads while the arm hangs still. `strength` scales
     the impacts and their roughness, `arm_m` is the length from shoulder to sensor, `noise_g` the sensor's white
-    noise. With `loop` the schedule begins again for ever, with other variations. ParameterError where a value is
-    out of range.
+    noise. `gaits` are the rows of its gaits, where the sensor is worn elsewhere than at the wrist. With `loop` the
+    schedule begins again for ever, with other variations. ParameterError where a value is out of range.
     """
 
     def __init__(
@@ -52,6 +74,7 @@ class Walker:
         strength: float = 1.0,
         arm_m: float = ARM_M,
         noise_g: float = SENSOR_NOISE_G,
+        gaits: Mapping[str, Gait] = GAITS,
     ) -> None:
         self.schedule = parse_schedule(schedule) if isinstance(schedule, str) else tuple(schedule)
         if not self.schedule:
@@ -64,7 +87,7 @@ class Walker:
         self._rate_hz = rate_hz
         self._loop = loop
         self._seed = seed
-        self._wearer = Wearer(strength=strength, arm_m=arm_m)
+        self._wearer = Wearer(strength=strength, arm_m=arm_m, gaits=gaits)
         self._axes = _axes(gravity)
         self._noise_g = noise_g
         self._blocks = self._make_blocks()
@@ -93,6 +116,24 @@ class Walker:
         self._left = samples[n:]
         return samples[:n]
 
+    def sensed(self) -> Sensed:
+        """Return the whole schedule, once through, with angular rate and field; what has been read changes nothing.
+
+        The acceleration is what `read` gives, bit for bit.
+        """
+        acc_g, gyro_rad_s, mag_ut = [], [], []
+        for number in range(len(self.schedule)):
+            laid = self._course(number)
+            rng = np.random.default_rng((self._seed, number, 2))
+            spread = math.hypot(laid.rough_rad_s, SENSOR_NOISE_RAD_S)
+            for t_s, acceleration in self._segment_blocks(number, laid):
+                noise = rng.standard_normal((2, len(t_s), 3))
+                acc_g.append(acceleration)
+                gyro_rad_s.append((laid.rate_rad_s(t_s) + spread * noise[0]) @ self._axes)
+                mag_ut.append((laid.field_ut(t_s, EARTH_UT) + SENSOR_NOISE_UT * noise[1]) @ self._axes)
+        parts = (np.concatenate(part) for part in (acc_g, gyro_rad_s, mag_ut))
+        return Sensed(**dict(zip(("acc_g", "gyro_rad_s", "mag_ut"), parts, strict=True)))
+
     def true_steps_until(self, t_s: float) -> int:
         """Return the steps taken up to `t_s` seconds after the start."""
         if not math.isfinite(t_s):
@@ -118,13 +159,17 @@ class Walker:
 
     def _make_blocks(self) -> Iterator[Floats]:
         for number in itertools.count() if self._loop else range(len(self.schedule)):
-            laid = self._course(number)
-            rng = np.random.default_rng((self._seed, number, 1))
-            first, last = (self._first_index(self._start_s(at)) for at in (number, number + 1))
-            for block in range(first, last, _BLOCK):
-                t_s = np.arange(block, min(block + _BLOCK, last)) / self._rate_hz
-                noise = rng.standard_normal((len(t_s), 3)) * math.hypot(laid.rough_g, self._noise_g)
-                yield (laid.arm_g(t_s) + noise) @ self._axes
+            for _, acceleration in self._segment_blocks(number, self._course(number)):
+                yield acceleration
+
+    def _segment_blocks(self, number: int, laid: Course) -> Iterator[tuple[Floats, Floats]]:
+        """Yield the times of the `number`-th segment's samples and their acceleration, block by block."""
+        rng = np.random.default_rng((self._seed, number, 1))
+        first, last = (self._first_index(self._start_s(at)) for at in (number, number + 1))
+        for block in range(first, last, _BLOCK):
+            t_s = np.arange(block, min(block + _BLOCK, last)) / self._rate_hz
+            noise = rng.standard_normal((len(t_s), 3)) * math.hypot(laid.rough_g, self._noise_g)
+            yield t_s, (laid.arm_g(t_s) + noise) @ self._axes
 
     def _first_index(self, t_s: float) -> int:
         """Return the first sample at or after `t_s`; a hair before counts as at."""

@@ -1,20 +1,20 @@
-"""Segments laid out: when the steps fall, and what the arm's acceleration is at any time.
+"""Segments laid out: when the steps fall, and what the arm's acceleration and attitude are at any time.
 
-A course gives acceleration in g along the hanging arm's forward, sideways and upward directions. It is a function of
-time alone, so that samples may be asked for in any portions and at any rate.
+A course gives acceleration in g along the hanging arm's forward, sideways and upward directions, and the angle by
+which it is turned. Both are functions of time alone, so that samples may be asked for in any portions and at any rate.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from device_sim.gait_profiles import GAITS, MOTIONS, Gait, Motion
+from device_sim.gait_profiles import MOTIONS, STEPPING_ROUGH_RAD_S, Gait, Motion
 from device_sim.gait_schedule import Segment
 from service.recordings.recording import STANDARD_GRAVITY
 
@@ -35,19 +35,45 @@ _RING_S: Final = 0.03
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wearer:
-    """`strength` scales impacts, `arm_m` is the length from shoulder to sensor."""
+    """`strength` scales impacts, `arm_m` is the length from shoulder to sensor, `gaits` the row of each gait."""
 
     strength: float
     arm_m: float
+    gaits: Mapping[str, Gait]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
-    """One segment: the times of its steps, the white noise of its motion, and the acceleration (n×3) at n times."""
+    """One segment: the times of its steps, the white noise of its motion, and the acceleration (n×3) at n times.
+
+    `turn_rad` gives at n times the angle by which the arm is turned from hanging, towards `turn_to`, a unit vector in
+    the plane of forward and sideways; `rough_rad_s` is the white part of its angular rate.
+    """
 
     step_t_s: Floats
     rough_g: float
+    rough_rad_s: float
     arm_g: Callable[[Floats], Floats]
+    turn_rad: Callable[[Floats], Floats]
+    turn_to: tuple[float, float]
+
+    def rate_rad_s(self, t_s: Floats) -> Floats:
+        """Return the angular rate (n×3) about forward, sideways, upward: an arm that swings forward has −θ′ sideways.
+
+        Central differences, as for the acceleration.
+        """
+        around = (self.turn_rad(t_s - _DIFFERENCE_S) - self.turn_rad(t_s + _DIFFERENCE_S)) / (2 * _DIFFERENCE_S)
+        return np.column_stack([-self.turn_to[1] * around, self.turn_to[0] * around, np.zeros(len(t_s))])
+
+    def field_ut(self, t_s: Floats, earth_ut: tuple[float, float, float]) -> Floats:
+        """Return the field `earth_ut` (forward, sideways, upward of somebody standing) as the turned arm sees it."""
+        turn = self.turn_rad(t_s)
+        ahead, aside = self.turn_to
+        along = earth_ut[0] * ahead + earth_ut[1] * aside
+        across = earth_ut[1] * ahead - earth_ut[0] * aside
+        turned = along * np.cos(turn) + earth_ut[2] * np.sin(turn)
+        up = earth_ut[2] * np.cos(turn) - along * np.sin(turn)
+        return np.column_stack([turned * ahead - across * aside, turned * aside + across * ahead, up])
 
 
 def course(segment: Segment, start_s: float, wearer: Wearer, rng: np.random.Generator) -> Course:
@@ -60,18 +86,26 @@ def course(segment: Segment, start_s: float, wearer: Wearer, rng: np.random.Gene
 
 def _gait_course(segment: Segment, start_s: float, wearer: Wearer, rng: np.random.Generator) -> Course:
     """Lay out steps; at both ends of the segment the arm hangs still, so that any activity may stand beside it."""
-    gait, count = GAITS[segment.activity], segment.steps
+    gait, count = wearer.gaits[segment.activity], segment.steps
     knots_s = start_s + _knots(segment.duration_s, count, gait.interval_sd, rng)
     phase = np.concatenate(([-0.5], np.arange(count), [count - 0.5]))
     foot = np.where(np.arange(count) % 2, -1.0, 1.0) * gait.asymmetry
     strength = np.pad(wearer.strength * (1 + foot) * (1 + gait.strength_sd * _normal(rng, count)), 1)
     from_an_end = np.minimum(np.arange(count), np.arange(count)[::-1])
-    swing = np.pad(np.minimum(_SWING_GAIN * from_an_end, 1.0), 1)
+    swing = np.pad(np.minimum(gait.swing_at_ends + _SWING_GAIN * from_an_end, 1.0), 1)
+    angle = _swinging(knots_s, phase, swing, gait)
 
     def arm_g(t_s: Floats) -> Floats:
-        return _walking(t_s, knots_s, phase, strength, swing, gait, wearer)
+        return _walking(t_s, knots_s, phase, strength, angle, gait, wearer)
 
-    return Course(step_t_s=knots_s[1:-1], rough_g=gait.rough_g * wearer.strength, arm_g=arm_g)
+    return Course(
+        step_t_s=knots_s[1:-1],
+        rough_g=gait.rough_g * wearer.strength,
+        rough_rad_s=STEPPING_ROUGH_RAD_S,
+        arm_g=arm_g,
+        turn_rad=angle,
+        turn_to=(1.0, 0.0),
+    )
 
 
 def _knots(duration_s: float, count: int, interval_sd: float, rng: np.random.Generator) -> Floats:
@@ -86,22 +120,36 @@ def _normal(rng: np.random.Generator, n: int) -> Floats:
     return np.clip(rng.standard_normal(n), -_SD_LIMIT, _SD_LIMIT)
 
 
-def _walking(
-    t_s: Floats, knots_s: Floats, phase: Floats, strength: Floats, swing: Floats, gait: Gait, wearer: Wearer
-) -> Floats:
-    """Return acceleration along the arm's forward, side and upward directions, at `t_s`.
-
-    θ = e (θ₀ + Θ cos(πφ + λ)) with e from 0 to 1 where somebody sets out; φ counts steps. With vertical acceleration v:
-    forward (1 + v) sin θ + L θ″, up (1 + v) cos θ + L θ′², in g.
-    """
+def _swinging(knots_s: Floats, phase: Floats, swing: Floats, gait: Gait) -> Callable[[Floats], Floats]:
+    """Return the arm's angle: θ = e (θ₀ + Θ cos(πφ + λ)) with e from 0 to 1 where somebody sets out; φ counts steps."""
     rates = _knot_rates(knots_s, phase)
     amplitude, mean = math.radians(gait.swing_deg), math.radians(gait.arm_deg)
 
     def angle(at_s: Floats) -> Floats:
         inside_s = np.clip(at_s, knots_s[0], knots_s[-1])
         turns = _hermite(inside_s, knots_s, phase, rates)
-        return _eased(inside_s, knots_s, swing) * (mean + amplitude * np.cos(math.pi * turns + gait.swing_lag_rad))
+        turned: Floats = _eased(inside_s, knots_s, swing) * (
+            mean + amplitude * np.cos(math.pi * turns + gait.swing_lag_rad)
+        )
+        return turned
 
+    return angle
+
+
+def _walking(
+    t_s: Floats,
+    knots_s: Floats,
+    phase: Floats,
+    strength: Floats,
+    angle: Callable[[Floats], Floats],
+    gait: Gait,
+    wearer: Wearer,
+) -> Floats:
+    """Return acceleration along the arm's forward, side and upward directions, at `t_s`.
+
+    With θ the angle and v the vertical acceleration: forward (1 + v) sin θ + L θ″, up (1 + v) cos θ + L θ′², in g.
+    """
+    rates = _knot_rates(knots_s, phase)
     before, now, after = (angle(t_s + shift) for shift in (-_DIFFERENCE_S, 0.0, _DIFFERENCE_S))
     rate = (after - before) / (2 * _DIFFERENCE_S)
     acceleration = (after - 2 * now + before) / _DIFFERENCE_S**2
@@ -164,17 +212,35 @@ def _motion_course(
         acc_g[:, 2] += motion.knock_g * wearer.strength * _knocking(since_s)
         return acc_g
 
-    return Course(step_t_s=np.empty(0), rough_g=motion.rough_g, arm_g=arm_g)
+    def turn_rad(t_s: Floats) -> Floats:
+        since_s = t_s - start_s
+        angle, _ = _turn(since_s, motion, every_s, turn_s)
+        return np.where((since_s < 0) | (since_s >= length_s // every_s * every_s), 0.0, angle)
+
+    return Course(
+        step_t_s=np.empty(0),
+        rough_g=motion.rough_g,
+        rough_rad_s=0.0,
+        arm_g=arm_g,
+        turn_rad=turn_rad,
+        turn_to=(math.cos(axis_rad), math.sin(axis_rad)),
+    )
 
 
 def _turning(since_s: Floats, motion: Motion, every_s: float, turn_s: float, axis_rad: float) -> Floats:
     """Turn gravity out within `turn_s`, hold, and back at the end of `every_s`, heaving on the way out."""
-    at_s = since_s % every_s
-    out = np.clip(np.minimum(at_s, every_s - at_s) / turn_s, 0, 1)
-    angle = math.radians(motion.turn_deg) * (1 - np.cos(math.pi * out)) / 2
+    angle, at_s = _turn(since_s, motion, every_s, turn_s)
     heave = np.where(at_s < turn_s, motion.heave_g * np.sin(2 * math.pi * at_s / turn_s), 0.0)
     aside, up = (1 + heave) * np.sin(angle), (1 + heave) * np.cos(angle)
     return np.column_stack([aside * math.cos(axis_rad), aside * math.sin(axis_rad), up])
+
+
+def _turn(since_s: Floats, motion: Motion, every_s: float, turn_s: float) -> tuple[Floats, Floats]:
+    """Return the angle in rad, and the time since this turn and its return began."""
+    at_s = since_s % every_s
+    out = np.clip(np.minimum(at_s, every_s - at_s) / turn_s, 0, 1)
+    angle: Floats = math.radians(motion.turn_deg) * (1 - np.cos(math.pi * out)) / 2
+    return angle, at_s
 
 
 def _knocking(since_s: Floats) -> Floats:

@@ -27,6 +27,16 @@ ARM_M: Final = 0.6
 SENSOR_NOISE_G: Final = 0.003
 """White, per axis: the quietest 2 s of the eth2023 recordings have 0.0017…0.0067."""
 
+SENSOR_NOISE_RAD_S: Final = 0.005
+"""White, per axis: the quietest 2 s of eth2023 and dcaiti have 0.005…0.022."""
+SENSOR_NOISE_UT: Final = 0.15
+"""White, per axis: the quietest 2 s of dcaiti and brajdic_walk have 0.12…0.31."""
+STEPPING_ROUGH_RAD_S: Final = 0.13
+"""White remainder of the angular rate while stepping, per axis, from first differences in windows of 4 s: medians
+6.5°/s on brajdic_walk, 7.9 on eth2023, 8.9 on dcaiti."""
+EARTH_UT: Final = (21.0, 0.0, -43.0)
+"""Forward, sideways, upward: central Europe, walking north; eth2023 has norms of 59…80 µT indoors, dcaiti 30…37."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gait:
@@ -34,7 +44,8 @@ class Gait:
 
     `asymmetry` is how much stronger than the mean one foot lands, `arm_deg` the forearm's mean angle to the vertical,
     `swing_deg` its swing to either side, `rough_g` the white remainder above 10 Hz. At
-    a step the arm is at its foremost or hindmost, where `swing_lag_rad` is 0. `measured` says where it is from.
+    a step the arm is at its foremost or hindmost, where `swing_lag_rad` is 0. `swing_at_ends` is the share of the
+    swing that the first and last step have. `measured` says where it is from.
     """
 
     cadence_spm: float
@@ -46,6 +57,7 @@ class Gait:
     arm_deg: float
     rough_g: float
     swing_lag_rad: float = 0.0
+    swing_at_ends: float = 0.0
     vertical_lag_rad: tuple[float, float, float, float] = WALK_LAG_RAD
     measured: str
 
@@ -276,5 +288,27 @@ MOTIONS: Final[dict[str, Motion]] = {
         turn_every_s=10,
         rough_g=0.047,
         measured="negatives_banglejs/drive29: per 10 s a turn of 10°, norm's sd 0.047 g",
+    ),
+    "turn_round": Motion(
+        turn_deg=10,
+        turn_s=1.0,
+        turn_every_s=3,
+        heave_g=0.15,
+        rough_g=0.03,
+        measured="nothing: no recording has it. Ours: turning on the spot, 10° of tilt, half a heave",
+    ),
+    "shake": Motion(
+        shake_hz=2.5,
+        shake_g=1.0,
+        shake_up_deg=30,
+        rough_g=0.05,
+        measured="nothing: no recording has it. Ours: shaken on the spot, in the rhythm of a run",
+    ),
+    "rotate": Motion(
+        turn_deg=90,
+        turn_s=0.5,
+        turn_every_s=1.0,
+        rough_g=0.03,
+        measured="nothing: no recording has it. Ours: 90° to and fro once a second, on the spot",
     ),
 }
