@@ -94,11 +94,15 @@ class Band:
 class Update:
     """What a counter says after a block: steps now certain, how many more are likely, and its view for the plot.
 
-    `trace` holds the filtered signal, one value a sample of the block, the first at device time `trace_from_s`.
+    `likely` names the pending steps where the counter can tell them apart; those it names no more and has not confirmed
+    are retracted. `trace` holds the filtered signal, one value a sample of the block, the first at device time
+    `trace_from_s`.
     """
 
     steps: tuple[Step, ...] = ()
     pending: int = 0
+    likely: Sequence[tuple[float, float]] = ()
+    """(device time, strength) of each; a step confirmed later has the same `at_s`."""
     trace_from_s: float = 0.0
     trace: Sequence[float] = ()
     bands: tuple[Band, ...] = ()
@@ -154,6 +158,20 @@ class StepCounted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Tentative:
+    """Neither kept nor numbered: the primary's step at `at_s` is likely, or is `retracted`; a StepCounted confirms it.
+
+    `interval_s` is the time since the likely or confirmed step before, None after a pause.
+    """
+
+    boot: int
+    at_s: float
+    strength: float
+    interval_s: float | None
+    retracted: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Gap:
     """Durable: samples that did not arrive. `filled` ones (≤ 0.6 s) were interpolated, others start filters afresh."""
 
@@ -206,4 +224,4 @@ class Counting:
     cadence_spm: float | None
 
 
-Event = StepCounted | Gap | Rebooted | Segmented | Described | Signal | Counting
+Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting

@@ -87,6 +87,21 @@ class StepEvent(_Durable):
     lower: float | None = Field(examples=[0.74])
 
 
+class TentativeEvent(_Event):
+    """A step of the primary counter that is likely, some 0.2 s after it happened; or that it has taken back.
+
+    The `step` event with the same `device_s` and `boot` confirms it. It has no ordinal and no log keeps it.
+    """
+
+    type: Literal["tentative"] = "tentative"
+    status: Literal["likely", "retracted"]
+    device_s: float = Field(description="Device time of the step, good to half a sample (0.01 s)", examples=[21.34])
+    boot: int
+    at_uncertainty_s: float = Field(description="How well `at` is known, besides the link's least delay")
+    strength: float = Field(description="Height above the valleys, in the counter's unit", examples=[0.6])
+    interval_s: float | None = Field(description="Time since the step before; null after a pause", examples=[0.54])
+
+
 class StateEvent(_Durable):
     """The connection came into another state."""
 
@@ -174,6 +189,7 @@ class Lagging(BaseModel):
 
 LiveMessage = Annotated[
     StepEvent
+    | TentativeEvent
     | StateEvent
     | GapEvent
     | RebootEvent

@@ -12,7 +12,7 @@ from service.pipeline.device import Device
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged, Notice, StateChanged
 from service.pipeline.supervisor import Supervisor
-from service.samples import Band, Counting, Gap, Rebooted, Segmented, Signal, StepCounted
+from service.samples import Band, Counting, Gap, Rebooted, Segmented, Signal, StepCounted, Tentative
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SIGNAL_DIGITS = 4
@@ -64,6 +64,8 @@ def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:
     if isinstance(notice.event, DeviceChanged):
         value = device_view(supervisor.device(notice.device))
         return models.DeviceEvent(device=notice.device, at=utc(notice.at_ns), value=value)
+    if isinstance(notice.event, Tentative):
+        return _tentative_view(notice, notice.event)
     if isinstance(notice.event, Signal | Counting):
         return _ephemeral_view(notice, notice.event)
     return durable_view(notice)
@@ -146,6 +148,19 @@ def lineup_view(lineup: Lineup) -> models.LineupModel:
         for choice in lineup.choices
     ]
     return models.LineupModel(counters=choices)
+
+
+def _tentative_view(notice: Notice, event: Tentative) -> models.TentativeEvent:
+    return models.TentativeEvent(
+        device=notice.device,
+        at=utc(notice.at_ns),
+        status="retracted" if event.retracted else "likely",
+        device_s=event.at_s,
+        boot=event.boot,
+        at_uncertainty_s=round(notice.uncertainty_s, 6),
+        strength=event.strength,
+        interval_s=event.interval_s,
+    )
 
 
 def _ephemeral_view(notice: Notice, event: Signal | Counting) -> models.SignalEvent | models.CountingEvent:

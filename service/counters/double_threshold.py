@@ -122,6 +122,7 @@ _KERNEL: Final = Kernel(
     close=kernel.close,
     stop=kernel.stop,
     pending=kernel.pending,
+    likely=kernel.likely,
     next_index=kernel.NEXT,
     constants=kernel.CONSTANTS,
     row=kernel.ROW,

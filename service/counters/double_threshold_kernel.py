@@ -159,19 +159,30 @@ def stop(s: State) -> None:
 
 
 def pending(s: State) -> int:
-    """Return how many peaks are likely to become steps: the bout's held ones, and undecided ones above T_H."""
-    likely = 0
+    """Return how many peaks are likely to become steps."""
+    return len(likely(s))
+
+
+def likely(s: State) -> list[tuple[float, float]]:
+    """Return index and height of the peaks that are likely to become steps.
+
+    Those are the held ones of a bout that is not certain yet, and undecided ones above T_H that rise above L by more
+    than rest.
+    """
+    found: list[tuple[float, float]] = []
     if s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT] and s[NEXT] - s[HALF] - s[LAST] < s[MAX_SPACING]:
-        likely = int(s[BOUT_PEAKS])
+        for i in range(int(s[BOUT_PEAKS])):
+            held = HELD + i * ROW
+            found.append((s[held + 1], s[held + 3] - s[held + 4]))
     if s[HIGH_KNOWN] == 0.0 or s[LOW_KNOWN] == 0.0:
-        return likely
-    upper = (s[HIGH] + s[LOW]) / 2.0
+        return found
+    upper, low, rest = (s[HIGH] + s[LOW]) / 2.0, s[LOW], s[REST]
     head, capacity = int(s[HEAD]), int(s[CAPACITY])
     for i in range(int(s[COUNT])):
-        peak = s[QUEUE + (head + i) % capacity * ENTRY + PEAK]
-        if peak > upper and peak - s[LOW] >= s[REST]:
-            likely += 1
-    return likely
+        q = QUEUE + (head + i) % capacity * ENTRY
+        if s[q + PEAK] > upper and s[q + PEAK] - low >= rest:
+            found.append((s[q + AT], s[q + PEAK] - low))
+    return found
 
 
 def _peak(s: State, at: float, value: float) -> None:

@@ -42,8 +42,10 @@ class Kernel:
     `scan(*columns, n, s, out)` eats n samples, writes the filtered signal to `out[:n]` and rows after it, and returns
     where they end; it is compiled for whole recordings. `close(s, out)` ends the stretch (at a gap or the end), writes
     rows to `out[0:]` and returns where they end. `stop(s)` forgets what must not outlast the end of the stream.
-    `pending(s)` counts likely steps. `s[next_index]` is the index of the sample to come, −1 before the first stretch;
-    `s[:constants]` never changes. A row is `row` floats; `delay` is by how many samples the filtered signal lags.
+    `pending(s)` counts likely steps; `likely(s)`, where an algorithm can name them, gives the grid index (the filter's
+    delay not removed) and the strength of each. `s[next_index]` is the index of the sample to come, −1 before the first
+    stretch; `s[:constants]` never changes. A row is `row` floats; `delay` is by how many samples the filtered signal
+    lags.
     """
 
     begin: Callable[..., None]
@@ -55,6 +57,7 @@ class Kernel:
     constants: int
     row: int
     delay: float
+    likely: Callable[[Any], list[tuple[float, float]]] | None = None
     sensors: tuple[Sensor, ...] = (Sensor.ACCELEROMETER,)
 
 
@@ -101,9 +104,11 @@ class KernelCounter:
         else:
             trace, found = self._scan_lists(columns, n)
         steps, bands = self._events(rows + found) if rows or found else ((), ())
+        likely = self._likely()
         return Update(
             steps=steps,
-            pending=kernel.pending(self._state),
+            pending=len(likely) if kernel.likely else kernel.pending(self._state),
+            likely=likely,
             trace_from_s=(block.start - kernel.delay) / GRID_HZ,
             trace=trace,
             bands=bands,
@@ -141,6 +146,12 @@ class KernelCounter:
     def read(self, rows: NDArray[np.float64]) -> tuple[Step, ...]:
         """Return the steps that `count`'s rows say."""
         return self._events(rows.ravel().tolist())[0]
+
+    def _likely(self) -> list[tuple[float, float]]:
+        if self._kernel.likely is None:
+            return []
+        delay = self._kernel.delay
+        return [((index - delay) / GRID_HZ, strength) for index, strength in self._kernel.likely(self._state)]
 
     def _columns(self, block: SampleBlock) -> tuple[Column, ...]:
         columns: tuple[Column, ...] = ()

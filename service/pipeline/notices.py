@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from service.pipeline.lifecycle import State
-from service.samples import Counting, Described, Event, Signal
+from service.samples import Counting, Described, Event, Signal, Tentative
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,11 +27,16 @@ EPHEMERAL = (Signal, Counting, Described, DeviceChanged)
 """Events of which only the newest matters: no ordinal, conflated for slow readers."""
 
 
+UNNUMBERED = (*EPHEMERAL, Tentative)
+"""Events without an ordinal, that no log keeps; a Tentative is queued like a durable one, for a retraction is news."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Notice:
-    """One event of one device. `at_ns` is host UTC of the moment it tells of; ephemeral ones have no ordinal."""
+    """One event of one device. `at_ns` is host UTC of the moment it tells of, known to `uncertainty_s`."""
 
     device: str
     at_ns: int
+    uncertainty_s: float
     ordinal: int | None
     event: Told

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from service.links.contract import Link
 from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
-from service.pipeline.notices import EPHEMERAL, DeviceChanged, Notice, StateChanged, Told
-from service.samples import Described, Event, Gap, Packet, Rebooted, StepCounted
+from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told
+from service.samples import Described, Event, Gap, Packet, Rebooted, StepCounted, Tentative
 from service.signals.hosttime import HostClock
 from service.tracking.tracker import Tracker
 
@@ -80,10 +80,16 @@ class Session:
         if isinstance(event, Described):
             event = DeviceChanged()
         ordinal = None
-        if not isinstance(event, EPHEMERAL):
+        if not isinstance(event, UNNUMBERED):
             self._ordinal += 1
             ordinal = self._ordinal
-        notice = Notice(device=self._name_device(), at_ns=at_ns, ordinal=ordinal, event=event)
+        notice = Notice(
+            device=self._name_device(),
+            at_ns=at_ns,
+            uncertainty_s=self._clock.uncertainty_s,
+            ordinal=ordinal,
+            event=event,
+        )
         if ordinal is not None:
             self.log.append(notice)
         self._publish(notice)
@@ -96,6 +102,8 @@ class Session:
         match event:
             case StepCounted():
                 return self._clock.at_ns(event.step.at_s)
+            case Tentative():
+                return self._clock.at_ns(event.at_s)
             case Gap():
                 return self._clock.at_ns(event.to_s)
             case _:

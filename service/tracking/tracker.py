@@ -31,6 +31,7 @@ from service.samples import (
 )
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
+from service.tracking.tentative import TentativeSteps
 from service.wearables.contract import Wearable
 
 _INDEX_SPAN = 1 << 32
@@ -76,6 +77,7 @@ class Tracker:
         self._factories = dict(counters)
         self._counters = {name: make() for name, make in counters.items()}
         self._cadence = Cadence()
+        self._tentative = TentativeSteps()
         self._timebase: Timebase | None = None
         self._boot: int | None = None
         self._next_index = 0
@@ -139,11 +141,14 @@ class Tracker:
             return events
         self.primary, self._segment = primary, (before, self.steps[primary])
         self._cadence = Cadence()
+        events += self._tentative.follow(self._boot or 0, (), ())
         return [*events, Segmented(primary=primary, steps=before), self._counting(0)]
 
     def finish(self) -> list[Event]:
         """End the stream: decide what is still pending."""
         events = self._finish_counters()
+        confirmed = [event.step for event in events if isinstance(event, StepCounted)]
+        events += self._tentative.follow(self._boot or 0, (), confirmed)
         return [*events, self._counting(0)]
 
     def snapshot(self) -> dict[str, Any]:
@@ -156,6 +161,7 @@ class Tracker:
             "steps_now": self.steps_now,
             "segment": list(self._segment),
             "cadence": self._cadence.snapshot(),
+            "tentative": self._tentative.snapshot(),
             "boot": self._boot,
             "next_index": self._next_index,
             "counter_faults": dict(self.counter_faults),
@@ -177,6 +183,7 @@ class Tracker:
         before, own = state["segment"]
         self._segment = (before, own)
         self._cadence.restore(state["cadence"])
+        self._tentative.restore(state["tentative"])
         self._boot, self._next_index = state["boot"], state["next_index"]
         self.counter_faults = dict(state["counter_faults"])
         self._held = RawBlock(**state["held"]) if state["held"] else None
@@ -238,6 +245,7 @@ class Tracker:
             events += self._confirm(name, update)
             if name == self.primary:
                 pending = update.pending
+                events += self._tentative.follow(self._boot or 0, update.likely, update.steps)
                 if len(update.trace) or update.bands:
                     events.append(Signal(from_s=update.trace_from_s, values=update.trace, bands=update.bands))
         events.append(self._counting(pending))
@@ -252,6 +260,9 @@ class Tracker:
             return []
         self.tally.reboots += 1
         events = self._finish_counters()
+        events += self._tentative.follow(
+            previous, (), [event.step for event in events if isinstance(event, StepCounted)]
+        )
         self._counters = {name: make() for name, make in self._factories.items()}
         self._cadence = Cadence()
         self._timebase, self._next_index = None, 0

@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import json
+import time
+from datetime import datetime
 
 import pytest
 import pytest_asyncio
@@ -60,6 +62,24 @@ async def test_the_signal_holds_the_thresholds_and_the_peaks_of_the_steps(walk):
     for step in steps:
         assert values[round(step["device_s"] * 50)] == pytest.approx(step["peak"], abs=1e-4)
     assert any(message["bands"] for message in heard if message["type"] == "signal")
+
+
+async def test_a_step_is_told_within_a_quarter_second_of_its_peak_then_confirmed_or_retracted():
+    async with staged(Bracelet(Walker("normal:600", seed=3))) as stage, stage.live() as feed:
+        began, heard = time.time(), []
+        while time.time() < began + 14:
+            heard.append((json.loads(await feed.recv()), time.time()))
+    likely = {m["device_s"]: (m, at) for m, at in heard if m["type"] == "tentative" and m["status"] == "likely"}
+    retracted = {m["device_s"] for m, _ in heard if m["type"] == "tentative" and m["status"] == "retracted"}
+    confirmed = {m["device_s"] for m, _ in heard if m["type"] == "step"}
+    assert len(confirmed) > 8
+    assert not confirmed & retracted
+    assert len(confirmed & set(likely)) >= 0.9 * len(confirmed)  # the rest pass only their own window's threshold
+    newest = max(confirmed)
+    assert {at_s for at_s in likely if at_s < newest} <= confirmed | retracted
+    late_s = [at - datetime.fromisoformat(m["at"]).timestamp() for m, at in likely.values()]
+    assert sorted(late_s)[len(late_s) // 2] <= 0.25
+    assert all(m["at_uncertainty_s"] < 0.1 for m, _ in likely.values())
 
 
 async def test_subscribing_by_device(walk):
@@ -133,7 +153,19 @@ async def test_our_own_page_may_connect(walk):
 async def test_every_event_has_a_schema_and_openapi_has_examples(walk):
     schema = (await walk.http.get("api/v1/live/schema")).json()
     kinds = set(schema["discriminator"]["mapping"])
-    assert kinds == {"snapshot", "step", "state", "gap", "reboot", "segment", "signal", "counting", "device", "lagging"}
+    assert kinds == {
+        "snapshot",
+        "step",
+        "tentative",
+        "state",
+        "gap",
+        "reboot",
+        "segment",
+        "signal",
+        "counting",
+        "device",
+        "lagging",
+    }
     openapi = (await walk.http.get("openapi.json")).json()
     device = openapi["components"]["schemas"]["Device"]["properties"]
     assert device["id"]["examples"]

@@ -11,12 +11,14 @@ from service.samples import Counting
 
 
 def durable(ordinal, device="a"):
-    return Notice(device=device, at_ns=0, ordinal=ordinal, event=StateChanged(state=State.LOST, reason=None))
+    return Notice(
+        device=device, at_ns=0, uncertainty_s=0.0, ordinal=ordinal, event=StateChanged(state=State.LOST, reason=None)
+    )
 
 
 def ephemeral(steps, device="a"):
     event = Counting(now_s=0.0, steps=steps, steps_now=steps, cadence_spm=None)
-    return Notice(device=device, at_ns=0, ordinal=None, event=event)
+    return Notice(device=device, at_ns=0, uncertainty_s=0.0, ordinal=None, event=event)
 
 
 async def test_durable_notices_come_whole_and_in_order_ephemeral_ones_conflated():

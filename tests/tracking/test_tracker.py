@@ -4,12 +4,23 @@ import json
 from dataclasses import replace
 
 import pytest
-from fakes import MetronomeCounter, data_packet, data_packets, described
+from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described
 from hypothesis import given
 from hypothesis import strategies as st
 
 from service.errors import CounterError
-from service.samples import Counting, Described, Gap, Packet, Rebooted, Segmented, Signal, StepCounted
+from service.samples import (
+    GRID_HZ,
+    Counting,
+    Described,
+    Gap,
+    Packet,
+    Rebooted,
+    Segmented,
+    Signal,
+    StepCounted,
+    Tentative,
+)
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 
@@ -195,6 +206,32 @@ def test_snapshot_and_restore_at_any_packet(cut):
     after = run(second, packets[cut:])
     assert steps(before + after) == steps(expected)
     assert json.dumps(second.snapshot()) == json.dumps(whole.snapshot())
+
+
+class Foresight(MetronomeCounter):
+    """Names each step at the sample before it, and once a step that never comes."""
+
+    def update(self, block):
+        update = super().update(block)
+        ahead = [k / GRID_HZ for k in range(self._next, self._next + 10) if k % EVERY == 0]
+        false = [1.3] if 1.0 <= self._next / GRID_HZ < 1.5 else []
+        return replace(update, likely=[(at_s, 0.5) for at_s in (*ahead, *false)])
+
+
+def test_likely_steps_are_told_then_confirmed_or_retracted():
+    tracker = Tracker(wire.Bracelet(), {"metronome": Foresight}, primary="metronome")
+    events = run(tracker, [*described(), *data_packets([10] * 10)])
+    told = [(event.at_s, event.interval_s, event.retracted) for event in only(events, Tentative)]
+    assert told == [
+        (0.5, None, False),
+        (1.0, 0.5, False),
+        (1.3, pytest.approx(0.3), False),
+        (1.5, pytest.approx(0.2), False),
+        (1.3, None, True),
+        (2.0, 0.5, False),
+    ]
+    ending = tracker.finish()
+    assert [(event.at_s, event.retracted) for event in only(ending, Tentative)] == [(2.0, True)]
 
 
 class Half(MetronomeCounter):
