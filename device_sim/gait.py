@@ -182,7 +182,8 @@ def _axes(gravity: tuple[float, float, float]) -> Floats:
     if up.shape != (3,) or not 0 < length < math.inf:
         raise ParameterError("gravity", gravity, "three finite numbers, not all 0, are wanted")
     up /= length
-    side = np.array([0.0, 1.0, 0.0]) if abs(up[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
+    # A phone that stands upright swings about its short side.
+    side = np.array([0.0, 1.0, 0.0]) if abs(up[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
     side -= side @ up * up
     side /= np.linalg.norm(side)
     return np.stack([np.cross(side, up), side, up])
