@@ -53,11 +53,11 @@ def test_the_count_now_may_fall(scripted: Scripted) -> None:
 
 
 def test_a_step_of_the_primary_counter_raises_the_count_and_another_counters_does_not(scripted: Scripted) -> None:
-    server = scripted(device(counters={"double_threshold": 40, "adaptive_peak": 39}))
+    server = scripted(device(steps=40, steps_now=40, counters={"double_threshold": 7, "adaptive_peak": 39}))
     page = server.open()
-    server.send(step(1, 1.0, 999, counter="adaptive_peak"), step(2, 1.0, 43))
-    expect(field(page, "steps-now")).to_have_text("43")
-    expect(field(page, "steps")).to_have_text("43")
+    server.send(step(1, 1.0, 999, counter="adaptive_peak"), step(2, 1.0, 8))
+    expect(field(page, "steps-now")).to_have_text("41")
+    expect(field(page, "steps")).to_have_text("41")
     expect(field(page, "others")).to_have_text("adaptive peak 999")
 
 

@@ -64,8 +64,8 @@ const TAKERS = {
     const counters = { ...device.counters, [message.counter]: message.steps };
     entry.device = { ...device, counters };
     if (message.counter !== device.primary) return;
-    const steps_now = Math.max(device.steps_now, message.steps);
-    entry.device = { ...device, counters, steps: message.steps, steps_now };
+    const steps = device.steps + 1; // the device's count, which goes on where the counter's own begins anew
+    entry.device = { ...device, counters, steps, steps_now: Math.max(device.steps_now, steps) };
     trace.addStep(message, nowMs);
   },
   counting(entry, { steps, steps_now, cadence_spm }) {
