@@ -7,9 +7,14 @@ them, they are not chosen for it. What walkers do in them is measured on real re
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
+
+from service.samples import SampleBlock
+
+Prepare = Callable[[SampleBlock, SampleBlock | None, Any], Mapping[str, Any]]
+"""(the walk, the calibration walk, parameters) → parameters that the paper takes from the walker."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +97,8 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """What the text says: `percent` accuracy of `method` as the `of` ("mean", "least") over rows.
+    """What the text says: `percent` accuracy of `method` as the `of` over rows: their "mean", the "least mean" of a row,
+    or the "least" of any walker.
 
     The rows are those of the tables whose number is in `tables` and whose label holds `rows`.
     """
@@ -122,8 +128,8 @@ class Real:
 class Paper:
     """One paper: where it is from, its tables, its claims, what of it real recordings can show.
 
-    `elapsed_s` is the published time for `TIMED_SAMPLES` by counter; `calibrated` says that its counter learns its
-    thresholds on each walker's own slowest walk.
+    `elapsed_s` is the published time for 5,000 samples by counter. `prepare` learns a counter's
+    parameters from each walker, on `calibration` where the paper has such a walk.
     """
 
     name: str
@@ -132,4 +138,5 @@ class Paper:
     claims: tuple[Claim, ...]
     real: tuple[Real, ...]
     elapsed_s: Mapping[str, float] = field(default_factory=dict)
-    calibrated: bool = False
+    calibration: Condition | None = None
+    prepare: Prepare | None = None

@@ -9,10 +9,11 @@ steps, by the authors' own word counted: pocketing and taking out the phone. The
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Final
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
 
 from service.evaluation.papers.conditions import Claim, Condition, Figures, Method, Paper, Real, Table, do, walk
+from service.samples import SampleBlock
 
 WALKERS: Final = 10
 _GYRO: Final = Method(label="zero crossing", counter="gyro_zero_crossing")
@@ -95,6 +96,14 @@ _NOT_STEPS: Final = (
     Condition(label="phone turned in the hand", parts=(do("rotate", 20),), pose="pocket", walkers=WALKERS),
 )
 
+
+def _thresholds(_: SampleBlock, slowest: SampleBlock | None, params: Any) -> Mapping[str, Any]:  # noqa: ANN401
+    from service.counters.gyro_zero_crossing import calibrated  # noqa: PLC0415  # only where it is counted
+
+    learnt = params if slowest is None else calibrated(slowest, params)
+    return {"peak_rad_s": learnt.peak_rad_s, "valley_rad_s": learnt.valley_rad_s}
+
+
 PAPER: Final = Paper(
     name="jayalath2013",
     title="A Gyroscope Based Accurate Pedometer Algorithm (Jayalath, Abhayasinghe, Murray)",
@@ -106,10 +115,12 @@ PAPER: Final = Paper(
         Table(title="Not steps (no table; counted, by the authors' word)", methods=(_GYRO,), rows=_NOT_STEPS),
     ),
     claims=(
-        Claim(text="flat land, however slow: 96 % and more", method=_GYRO.label, percent=96, of="mean", tables=(3,)),
+        Claim(
+            text="flat land, however slow: 96 % and more", method=_GYRO.label, percent=96, of="least mean", tables=(3,)
+        ),
         Claim(text="least at any rate: 94.59 %", method=_GYRO.label, percent=94.59, of="least", tables=(3,)),
-        Claim(text="slopes: 95 %", method=_GYRO.label, percent=95, of="mean", tables=(2,), rows="inclined"),
-        Claim(text="stairs: 90 %", method=_GYRO.label, percent=90, of="mean", tables=(2,), rows="stairs"),
+        Claim(text="slopes: 95 %", method=_GYRO.label, percent=95, of="least", tables=(2,), rows="inclined"),
+        Claim(text="stairs: 90 %", method=_GYRO.label, percent=90, of="least", tables=(2,), rows="stairs"),
     ),
     real=(
         Real(label="walk, stairs, circles; phone in the hand", placement="hand_or_pocket.*", claim=96),
@@ -118,5 +129,6 @@ PAPER: Final = Paper(
         Real(label="phone handled, standing", placement="hand", activity=".*handling.*"),
         Real(label="arm exercises", placement="wrist", activity="shoulder.*"),
     ),
-    calibrated=True,
+    calibration=Condition(label="slowest walk", parts=(walk("slow", 60, 50),), pose="pocket"),
+    prepare=_thresholds,
 )

@@ -1,0 +1,99 @@
+"""Which real recordings have a paper's conditions, and what the paper's counters make of them."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from service.errors import SteplinkError
+from service.evaluation.choices import Found
+from service.evaluation.papers.conditions import Figures, Method, Paper, Real
+from service.evaluation.papers.results import figures
+from service.evaluation.rows import Choice, Row
+from service.recordings import read
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """A method on the real recordings of one condition and data set; `hours` is their length."""
+
+    condition: Real
+    dataset: str
+    method: Method
+    recordings: int
+    hours: float
+    steps: tuple[tuple[int, int], ...]
+
+    @property
+    def figures(self) -> Figures:
+        """Means, variances and extremes over recordings."""
+        return figures(self.steps)
+
+    @property
+    def false_per_hour(self) -> float:
+        """Counted steps an hour, where there are none."""
+        return sum(counted for _, counted in self.steps) / self.hours
+
+
+def methods(paper: Paper) -> list[Method]:
+    """Return the methods of the paper's tables, each once, without the other wrist."""
+    found: list[Method] = []
+    for table in paper.tables:
+        found += [method for method in table.methods if method not in found and not method.mirrored]
+    return found
+
+
+def choice(method: Method, preset: str) -> Choice:
+    """Return the method as `evaluate` takes it."""
+    return Choice(counter=method.counter, preset=preset, overrides=method.params)
+
+
+def wanted(paper: Paper, found: Sequence[Found], lsb_per_g: float) -> list[Found]:
+    """Return the files that have one of the paper's conditions and a known number of steps."""
+    return [file for file in found if _is_wanted(paper, file, lsb_per_g)]
+
+
+def _is_wanted(paper: Paper, file: Found, lsb_per_g: float) -> bool:
+    try:
+        recording = read(file.path, lsb_per_g=lsb_per_g)
+    except SteplinkError:
+        return False
+    known = recording.true_steps is not None or recording.step_t_s is not None
+    return known and any(fits(real, recording.placement, recording.activity) for real in paper.real)
+
+
+def fits(real: Real, placement: str | None, activity: str | None) -> bool:
+    """Tell whether a recording made so is one of the condition."""
+    patterns = ((real.placement, placement), (real.activity, activity))
+    return all(re.fullmatch(pattern, value or "") for pattern, value in patterns)
+
+
+def measured(paper: Paper, counted: Sequence[tuple[Method, Row]]) -> list[Measured]:
+    """Group counted recordings by condition, data set and method, in the paper's order."""
+    groups: dict[tuple[int, str, int], list[Row]] = defaultdict(list)
+    order = methods(paper)
+    for method, row in counted:
+        for number, real in enumerate(paper.real):
+            if row.steps is not None and row.true_steps is not None and fits(real, row.placement, row.activity):
+                groups[number, row.dataset, order.index(method)].append(row)
+    return [_measured(paper.real[number], dataset, order[at], rows) for (number, dataset, at), rows in _sorted(groups)]
+
+
+def _sorted(
+    groups: dict[tuple[int, str, int], list[Row]],
+) -> list[tuple[tuple[int, str, int], list[Row]]]:
+    return sorted(groups.items(), key=lambda item: item[0])
+
+
+def _measured(real: Real, dataset: str, method: Method, rows: Sequence[Row]) -> Measured:
+    walks = [row for row in rows if row.true_steps] or list(rows)
+    return Measured(
+        condition=real,
+        dataset=dataset,
+        method=method,
+        recordings=len(walks),
+        hours=sum(row.duration_s or 0.0 for row in walks) / 3600,
+        steps=tuple((row.true_steps or 0, row.steps or 0) for row in walks),
+    )
