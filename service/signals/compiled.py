@@ -1,8 +1,8 @@
 """One source, two speeds: a scalar kernel as it is while live, the same function compiled where a recording is long.
 
 A kernel is a plain function of indexables and floats (`+ − × ÷`, comparisons, `math.sqrt` and the few others shown to
-give equal bits). `compiled` translates it, and the module-level functions it calls, with numba from the `fast` extra;
-without numba it gives back the plain function. Either way steps and state are the same, bit for bit.
+give equal bits). `compiled` translates it, and the plain functions it calls by their bare names, with numba from the
+`fast` extra; without numba it gives back the plain function. Either way steps and state are the same, bit for bit.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ def compiled(kernel: Kernel) -> Kernel:
 
 
 def _with_compiled_callees(kernel: Kernel) -> Kernel:
-    """Copy `kernel` with the plain functions of its own module that it names replaced by compiled ones."""
+    """Copy `kernel` with the plain functions that it names, its own module's or imported, replaced by compiled ones."""
     if not isinstance(kernel, types.FunctionType):
         raise TypeError(f"{kernel!r} is no plain function")
     scope = dict(kernel.__globals__)
     for name in kernel.__code__.co_names:
         callee = scope.get(name)
-        if isinstance(callee, types.FunctionType) and callee.__module__ == kernel.__module__:
+        if isinstance(callee, types.FunctionType):
             scope[name] = compiled(callee)
     return types.FunctionType(kernel.__code__, scope, kernel.__name__, kernel.__defaults__)
