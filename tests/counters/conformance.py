@@ -54,11 +54,11 @@ class Outcome:
 
 
 def walk(n: int, step_hz: float, swing_g: float, rest_g: float = 1.0) -> NDArray[np.float64]:
-    """Return n × 9 of a clean walk: acceleration once a step, arm and field once in two steps."""
+    """Return n × 9 of a clean walk: acceleration once a step, arm and field once in two steps; without swing, rest."""
     phase = 2 * pi * step_hz * np.arange(n) / GRID_HZ
     values = np.zeros((n, 9))
     values[:, 2] = rest_g + swing_g * np.sin(phase)
-    values[:, 3] = 2.0 * np.sin(phase / 2)
+    values[:, 3] = 2.0 * np.sin(phase / 2) if swing_g else 0.0
     values[:, 6] = 40.0 + 10.0 * np.cos(phase / 2)
     return values
 
@@ -188,8 +188,11 @@ def check_silence(make: Make, value_g: float) -> None:
     assert update.pending == 0
 
 
-def check_walk(make: Make, step_hz: float, swing_g: float, *, slack: int) -> None:
-    """On a clean walk of 40 steps between two rests at most `slack` are missed or too many."""
+def check_walk(make: Make, step_hz: float, swing_g: float, *, slack: int, moment: float = 0.25) -> None:
+    """On a clean walk of 40 steps between two rests at most `slack` are missed or too many.
+
+    `moment` is where in a step's cycle the counter places it: at the crest of acceleration, if nothing else is said.
+    """
     true_steps = 40
     rest = walk(100, step_hz, 0.0)
     moving = walk(round(true_steps / step_hz * GRID_HZ), step_hz, swing_g)
@@ -197,9 +200,15 @@ def check_walk(make: Make, step_hz: float, swing_g: float, *, slack: int) -> Non
     outcome = collect(make(), [signal.block()], finish=True)
     assert abs(len(outcome.steps) - true_steps) <= slack
     at_s = np.array([step.at_s for step in outcome.steps]) - len(rest) / GRID_HZ
-    first_crest_s = 0.25 / step_hz
-    off_s = (at_s - first_crest_s + 0.5 / step_hz) % (1 / step_hz) - 0.5 / step_hz
+    off_s = (at_s - moment / step_hz + 0.5 / step_hz) % (1 / step_hz) - 0.5 / step_hz
     assert np.abs(np.median(off_s)) <= 1.5 / GRID_HZ
+
+
+def check_walk_outside(make: Make, step_hz: float, swing_g: float) -> None:
+    """A clean walk outside a counter's declared limits is missed, in half or more, and not counted otherwise."""
+    true_steps = 40
+    signal = Signal(walk(round(true_steps / step_hz * GRID_HZ), step_hz, swing_g))
+    assert len(collect(make(), [signal.block()], finish=True).steps) <= true_steps / 2
 
 
 def check_foreign_snapshot(make: Make, others: Iterable[StepCounter]) -> None:
