@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from service.counters import double_threshold
+from service.counters import double_threshold, gyro_zero_crossing
 from service.counters.contract import StepCounter, with_overrides
 from service.errors import CounterError
 from service.samples import Sensor
@@ -19,6 +19,7 @@ DEFAULT: Final = "double_threshold"
 """The counter that runs where none is asked for."""
 
 ACCELEROMETER: Final = frozenset({Sensor.ACCELEROMETER})
+GYROSCOPE: Final = frozenset({Sensor.GYROSCOPE})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +47,13 @@ _KINDS: Final = (
         paper=double_threshold.PAPER,
         tuned=double_threshold.TUNED,
         sensors=ACCELEROMETER,
+    ),
+    _kind(
+        "gyro_zero_crossing",
+        gyro_zero_crossing.build,
+        paper=gyro_zero_crossing.PAPER,
+        tuned=gyro_zero_crossing.TUNED,
+        sensors=GYROSCOPE,
     ),
 )
 
