@@ -97,10 +97,9 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """What the text says: `percent` accuracy of `method` as the `of` over rows: their "mean", the "least mean" of a row,
-    or the "least" of any walker.
+    """What the text says: an accuracy of `percent` by `method`, in the rows that hold `rows` of the tables `tables`.
 
-    The rows are those of the tables whose number is in `tables` and whose label holds `rows`.
+    It is of their mean, of the least mean of a row, or of the least walker (`of`: "mean", "least mean", "least").
     """
 
     text: str
@@ -115,13 +114,13 @@ class Claim:
 class Real:
     """Real recordings of a condition: those whose `placement` and `activity` match these regular expressions.
 
-    `claim` is the published accuracy in percent, None where the condition holds no steps or nothing was claimed.
+    `claims` are published accuracies in percent, by the method's label.
     """
 
     label: str
     placement: str
     activity: str = ".*"
-    claim: float | None = None
+    claims: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

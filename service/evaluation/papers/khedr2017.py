@@ -83,11 +83,20 @@ PAPER: Final = Paper(
     ),
     claims=tuple(_claims()),
     real=(
-        Real(label="walk, phone in the hand", placement="hand", activity="walk.*", claim=99.6),
-        Real(label="walk, stairs, circles; phone in the hand", placement="hand_or_pocket.*", claim=99.6),
-        Real(label="walk, run and arm work mixed, wrist", placement="wrist", activity=".*mixed.*", claim=99.47),
-        Real(label="run, wrist", placement="wrist", activity="run|jog", claim=99.47),
-        Real(label="stairs, wrist", placement="wrist", activity=".*(stairs|steps_down).*", claim=99.47),
+        Real(label="walk, phone in the hand", placement="hand", activity="walk.*", claims={_FUSION.label: 99.6}),
+        Real(
+            label="walk, stairs, circles; phone in the hand", placement="hand_or_pocket.*", claims={_FUSION.label: 99.6}
+        ),
+        Real(
+            label="walk, run and arm work mixed, wrist",
+            placement="wrist",
+            activity=".*mixed.*",
+            claims={_FUSION.label: 99.47},
+        ),
+        Real(label="run, wrist", placement="wrist", activity="run|jog", claims={_FUSION.label: 99.47}),
+        Real(
+            label="stairs, wrist", placement="wrist", activity=".*(stairs|steps_down).*", claims={_FUSION.label: 99.47}
+        ),
         Real(label="phone handled, standing", placement="hand", activity=".*handling.*"),
     ),
 )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from service.errors import SteplinkError
 from service.evaluation.choices import Found
 from service.evaluation.papers.conditions import Figures, Method, Paper, Real
-from service.evaluation.papers.results import figures
+from service.evaluation.papers.results import figures, pairs
 from service.evaluation.rows import Choice, Row
 from service.recordings import read
 
@@ -24,7 +24,17 @@ class Measured:
     method: Method
     recordings: int
     hours: float
-    steps: tuple[tuple[int, int], ...]
+    rows: tuple[Row, ...]
+
+    @property
+    def steps(self) -> tuple[tuple[int, int], ...]:
+        """(true, counted) of each recording."""
+        return pairs(self.rows)
+
+    @property
+    def claim(self) -> float | None:
+        """Published accuracy of the method in this condition, in percent."""
+        return self.condition.claims.get(self.method.label)
 
     @property
     def figures(self) -> Figures:
@@ -95,5 +105,5 @@ def _measured(real: Real, dataset: str, method: Method, rows: Sequence[Row]) -> 
         method=method,
         recordings=len(walks),
         hours=sum(row.duration_s or 0.0 for row in walks) / 3600,
-        steps=tuple((row.true_steps or 0, row.steps or 0) for row in walks),
+        rows=tuple(walks),
     )

@@ -16,6 +16,7 @@ import numpy as np
 from service.evaluation.papers.conditions import Figures, Paper, Table
 from service.evaluation.papers.real import Measured
 from service.evaluation.papers.results import Result, Timing, claimed
+from service.evaluation.rows import Row
 from service.evaluation.tables import aligned
 
 MISSING: Final = "not available"
@@ -37,6 +38,12 @@ class Report:
     results: Sequence[Result]
     measured: Sequence[Measured] | None = None
     timings: Sequence[Timing] = ()
+
+    @property
+    def rows(self) -> list[Row]:
+        """Every walk and recording that was counted."""
+        made = [row for result in self.results for row in result.rows or ()]
+        return made + [row for found in self.measured or () for row in found.rows]
 
     def text(self) -> str:
         """Return it for a terminal."""
@@ -70,7 +77,7 @@ class Report:
 
 def _asked(results: Sequence[Result]) -> str:
     counters = dict.fromkeys(result.method.counter for result in results)
-    absent = dict.fromkeys(result.method.counter for result in results if result.steps is None)
+    absent = dict.fromkeys(result.method.counter for result in results if result.rows is None)
     return ", ".join(f"{name} ({MISSING})" if name in absent else name for name in counters)
 
 
@@ -87,7 +94,7 @@ def _walks(found: Sequence[Result]) -> list[list[str]]:
     for result in found:
         published = result.published
         true = published.true if published.true is not None else float(result.condition.steps)
-        ours = [MISSING, "", ""] if result.steps is None else _counts(result.ours, result.ours.true)
+        ours = [MISSING, "", ""] if result.rows is None else _counts(result.ours, result.ours.true)
         cells = [_number(true, 0), *_counts(published, true), *ours]
         lines.append([result.condition.label, result.method.label, *cells])
     for method in dict.fromkeys(result.method.label for result in found):
@@ -103,7 +110,7 @@ def _many(found: Sequence[Result]) -> list[list[str]]:
     for result in found:
         if result.published != Figures():
             lines.append([result.condition.label, result.method.label, "published", *_statistics(result.published)])
-        ours = [MISSING, *[""] * 7] if result.steps is None else _statistics(result.ours)
+        ours = [MISSING, *[""] * 7] if result.rows is None else _statistics(result.ours)
         lines.append([result.condition.label, result.method.label, "ours", *ours])
     for before, line in reversed(list(pairwise(lines))):
         if before[0] == line[0]:
@@ -149,7 +156,7 @@ def _real(measured: Sequence[Measured] | None) -> list[str]:
     columns = ("rec.", "true", "counted", "accuracy", "var", "min", "max", "false/h", "claim", "met?")
     lines = [["condition", "data set", "method", *columns]]
     for row in measured:
-        of, claim = row.figures, row.condition.claim
+        of, claim = row.figures, row.claim
         true, counted = (sum(column) for column in zip(*row.steps, strict=True))
         accuracy = [_number(value) for value in (of.accuracy, of.accuracy_var, of.low, of.high)]
         false = "" if true else f"{row.false_per_hour:.0f}"
@@ -181,7 +188,7 @@ def _real_row(paper: Paper, row: Measured, preset: str) -> dict[str, Any]:
         "preset": preset,
         "dataset": row.dataset,
         "recordings": row.recordings,
-        "claim": row.condition.claim,
+        "claim": row.claim,
         "ours": asdict(row.figures),
         "false_per_hour": None if any(true for true, _ in row.steps) else row.false_per_hour,
     }

@@ -5,8 +5,8 @@ Variances are the populations', as the papers' are (Table II of 2013: 10.70 of 1
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,8 @@ from service.evaluation.counting import count
 from service.evaluation.metrics import accuracy_percent
 from service.evaluation.papers.conditions import Claim, Condition, Figures, Method, Paper, Table
 from service.evaluation.papers.people import block
-from service.samples import Columns, SampleBlock
+from service.evaluation.rows import Row
+from service.samples import GRID_HZ, Columns, SampleBlock
 
 TIMED_SAMPLES: Final = 5000
 """Figure 13 of 2015."""
@@ -25,7 +26,7 @@ BEST_OF: Final = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What one method counted of one condition: (true, counted) for each walker; None where there is no such counter.
+    """What one method counted of one condition: a row for each walker; None where there is no such counter.
 
     `table` is the table's number in its paper, from 1.
     """
@@ -33,12 +34,12 @@ class Result:
     table: int
     condition: Condition
     method: Method
-    steps: tuple[tuple[int, int], ...] | None
+    rows: tuple[Row, ...] | None
 
     @property
     def ours(self) -> Figures:
         """Our figures; empty where nothing was counted."""
-        return Figures() if self.steps is None else figures(self.steps)
+        return Figures() if self.rows is None else figures(pairs(self.rows))
 
     @property
     def published(self) -> Figures:
@@ -78,6 +79,11 @@ def figures(steps: Sequence[tuple[int, int]]) -> Figures:
     )
 
 
+def pairs(rows: Iterable[Row]) -> tuple[tuple[int, int], ...]:
+    """Return (true, counted) of each row."""
+    return tuple((row.true_steps or 0, row.steps or 0) for row in rows)
+
+
 def walkers(paper: Paper) -> int:
     """Return how many walks `results` counts."""
     return sum(row.walkers * len(table.methods) for table in paper.tables for row in table.rows)
@@ -93,13 +99,13 @@ def results(paper: Paper, preset: str = "paper") -> Iterator[Result | None]:
             people = [at] if condition.walkers == 1 else range(condition.walkers)
             for method in table.methods:
                 if method.counter not in registry.COUNTERS:
-                    yield Result(table=number, condition=condition, method=method, steps=None)
+                    yield Result(table=number, condition=condition, method=method, rows=None)
                     continue
-                steps = []
+                rows = []
                 for k in people:
-                    steps.append((condition.steps, _counted(paper, table, condition, method, k, preset)))
+                    rows.append(_counted(paper, table, condition, method, k, preset))
                     yield None
-                yield Result(table=number, condition=condition, method=method, steps=tuple(steps))
+                yield Result(table=number, condition=condition, method=method, rows=tuple(rows))
 
 
 def claimed(claim: Claim, found: Sequence[Result]) -> float | None:
@@ -146,10 +152,25 @@ def _cut(columns: Columns) -> Columns:
     return x, y, z
 
 
-def _counted(paper: Paper, table: Table, condition: Condition, method: Method, k: int, preset: str) -> int:
+def _counted(paper: Paper, table: Table, condition: Condition, method: Method, k: int, preset: str) -> Row:
     walked = block(condition, k, mirrored=method.mirrored, noise_g=table.noise_g)
     overrides = dict(method.params)
     if paper.prepare is not None:
         slowest = None if paper.calibration is None else block(paper.calibration, k)
         overrides |= paper.prepare(walked, slowest, registry.parameters(method.counter, preset, overrides))
-    return count(walked, method.counter, preset, overrides).steps
+    counted = count(walked, method.counter, preset, overrides)
+    return Row(
+        path=f"{paper.name}/{condition.label}/{k}",
+        dataset=table.title,
+        counter=method.counter,
+        preset=preset,
+        params=asdict(registry.parameters(method.counter, preset, overrides)),
+        placement=condition.pose,
+        activity=condition.label,
+        rate_hz=float(GRID_HZ),
+        true_steps=condition.steps,
+        steps=counted.steps,
+        duration_s=counted.samples / GRID_HZ,
+        samples=counted.samples,
+        elapsed_s=counted.elapsed_s,
+    )
