@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from service.counters import double_threshold, gyro_zero_crossing
+from service.counters import adaptive_peak, conventional_peak, double_threshold, gyro_zero_crossing, plus_minus
 from service.counters.contract import StepCounter, with_overrides
 from service.errors import CounterError
 from service.samples import Sensor
@@ -55,6 +55,21 @@ _KINDS: Final = (
         tuned=gyro_zero_crossing.TUNED,
         sensors=GYROSCOPE,
     ),
+    _kind(
+        "adaptive_peak",
+        adaptive_peak.build,
+        paper=adaptive_peak.PAPER,
+        tuned=adaptive_peak.TUNED,
+        sensors=ACCELEROMETER,
+    ),
+    _kind(
+        "conventional_peak",
+        conventional_peak.build,
+        paper=conventional_peak.PAPER,
+        tuned=conventional_peak.TUNED,
+        sensors=ACCELEROMETER,
+    ),
+    _kind("plus_minus", plus_minus.build, paper=plus_minus.PAPER, tuned=plus_minus.TUNED, sensors=ACCELEROMETER),
 )
 
 COUNTERS: Final[Mapping[str, CounterKind]] = MappingProxyType({kind.name: kind for kind in _KINDS})

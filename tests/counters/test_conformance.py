@@ -14,11 +14,18 @@ from service.counters import registry
 
 VARIANTS = [(name, preset) for name in registry.COUNTERS for preset in registry.COUNTERS[name].presets]
 
-SLACK = {("double_threshold", "paper"): 24}
-"""T_L = L lets only valleys under their own mean pass, and on an even walk half of them are not."""
+SLACK = {("double_threshold", "paper"): 24, ("fusion", "paper"): 3}
+"""T_L = L lets only valleys under their own mean pass, and on an even walk half of them are not. The suite's arm turns
+and its gravity does not, so displacements are uneven, and 0.6 of their mean is not always reached."""
 
 MOMENT = {"gyro_zero_crossing": 0.0}
 """A step is where the turning changes its direction, and the suite's arm turns as acceleration begins to rise."""
+
+OUTSIDE = {
+    ("adaptive_peak", "paper"): lambda step_hz, swing_g: swing_g <= 0.2 or step_hz < 1 / 0.8,
+    ("conventional_peak", "paper"): lambda step_hz, swing_g: swing_g <= 0.2 or step_hz > 1 / 0.4,
+}
+"""Walks that a paper's own limits exclude: peaks up to 1.2 g; steps outside 0.3 to 0.8 s, and 0.4 to 1 s."""
 
 few = settings(max_examples=40, deadline=None)
 
@@ -78,6 +85,9 @@ def test_silence_has_no_steps(make, value_g):
 @pytest.mark.parametrize("step_hz", [1.1, 1.7, 2.1, 2.9])
 @pytest.mark.parametrize("swing_g", [0.2, 0.6])
 def test_a_clean_walk_is_counted(make, step_hz, swing_g):
+    if OUTSIDE.get(make.args, lambda *_: False)(step_hz, swing_g):
+        conformance.check_walk_outside(make, step_hz, swing_g)
+        return
     conformance.check_walk(make, step_hz, swing_g, slack=SLACK.get(make.args, 2), moment=MOMENT.get(make.args[0], 0.25))
 
 
