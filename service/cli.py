@@ -1,7 +1,8 @@
-"""The commands: `steplink demo`, `serve`, `scan`, `sim`.
+"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `evaluate`, `bench`.
 
 Ctrl-C or SIGTERM ends each cleanly with exit code 0; a wrong option, file or port ends it with one line and exit code
-2; no Bluetooth with one line and exit code 3. Nothing heavy is imported before a command needs it.
+2; no Bluetooth with one line and exit code 3; an evaluation without a single count with exit code 1. Nothing heavy is
+imported before a command needs it.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Callable, Coroutine, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from service import cli_options
 from service.config import Settings
 from service.errors import LinkError, SteplinkError
 
@@ -27,12 +29,13 @@ if TYPE_CHECKING:
     from service.links.ble import Backend
     from service.pipeline.supervisor import Supervisor
 
+NOTHING_COUNTED = 1
 USAGE_ERROR = 2
 NO_BLUETOOTH = 3
 DEFAULT_AIR = "127.0.0.1:7400"
 DEMO_WALK = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
 
-Command = Callable[[argparse.Namespace], Coroutine[Any, Any, None]]
+Command = Callable[[argparse.Namespace], Coroutine[Any, Any, int | None]]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -40,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(argv)
     logging.basicConfig(level=logging.WARNING, format="steplink: %(message)s")
     try:
-        asyncio.run(_stoppable(options.command(options)))
+        return asyncio.run(_stoppable(options.command(options))) or 0
     except (KeyboardInterrupt, asyncio.CancelledError):
         return 0
     except LinkError as error:
@@ -49,16 +52,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SteplinkError as error:
         print(f"steplink: {error}", file=sys.stderr)
         return USAGE_ERROR
-    return 0
 
 
-async def _stoppable(work: Coroutine[Any, Any, None]) -> None:
+async def _stoppable(work: Coroutine[Any, Any, int | None]) -> int | None:
     """Await `work`; SIGTERM cancels it as Ctrl-C does."""
     task = asyncio.current_task()
     if task is not None:
         with contextlib.suppress(NotImplementedError):  # Windows has no signal handlers on its loop
             asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
-    await work
+    return await work
 
 
 async def _demo(options: argparse.Namespace) -> None:
@@ -105,6 +107,43 @@ async def _sim(options: argparse.Namespace) -> None:
         print(f"    steplink serve --air {options.air}", flush=True)
         await played.played.wait()
         print("the recording has been played")
+
+
+async def _evaluate(options: argparse.Namespace) -> int:
+    """Count recordings and compare with their true steps."""
+    from service.evaluation import choices, json_file  # noqa: PLC0415
+    from service.evaluation.progress import ProgressBar  # noqa: PLC0415
+    from service.evaluation.run import evaluate  # noqa: PLC0415
+    from service.evaluation.tables import report  # noqa: PLC0415
+
+    names, paths = choices.counters_and_paths(options.counter, options.path)
+    chosen = choices.choices(names, options.preset, options.param)
+    found, passed = choices.find(paths)
+    output = json_file.checked_path(options.json)
+    if passed:
+        print(f"steplink: passed over texts without acceleration: {', '.join(passed)}", file=sys.stderr)
+    with ProgressBar() as progress:
+        rows = await evaluate(found, chosen, jobs=options.jobs, lsb_per_g=options.lsb_per_g, progress=progress)
+    print(report(rows))
+    json_file.write_json(output, (row.as_json() for row in rows))
+    return NOTHING_COUNTED if all(row.error for row in rows) else 0
+
+
+async def _bench(options: argparse.Namespace) -> None:
+    """Measure the counters' speed."""
+    from service.evaluation import bench, choices, json_file  # noqa: PLC0415
+    from service.signals.compiled import available  # noqa: PLC0415
+
+    names = [choice.counter for choice in choices.choices(options.counter or ["all"], "tuned", ())]
+    output = json_file.checked_path(options.json)
+    if not available():
+        print(bench.WITHOUT_NUMBA, file=sys.stderr)
+    figures = []
+    for figure in bench.figures(names, options.samples):
+        print(f"{figure.name:<56}{figure.value:>15,.4g} {figure.unit}", flush=True)
+        figures.append(dataclasses.asdict(figure))
+        await asyncio.sleep(0)  # Ctrl-C is heeded here
+    json_file.write_json(output, figures)
 
 
 async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
@@ -209,6 +248,10 @@ def _parser() -> argparse.ArgumentParser:
         "--air", metavar="HOST:PORT", default=DEFAULT_AIR, help=f"where its radio is (default {DEFAULT_AIR})"
     )
     _add_bracelet(sim)
+    evaluate = _command(commands, "evaluate", _evaluate, "count recordings and compare with their true steps")
+    cli_options.add_evaluation(evaluate)
+    bench = _command(commands, "bench", _bench, "measure how fast the counters are")
+    cli_options.add_bench(bench)
     return parser
 
 

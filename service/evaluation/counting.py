@@ -8,7 +8,7 @@ numba's compilation.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -111,9 +111,9 @@ def count(
         elapsed_s = time.perf_counter() - began_s
         steps = made.read(rows)
     else:
-        pieces = _pieces(block)
+        parts = pieces(block)
         began_s = time.perf_counter()
-        steps = tuple(_streamed(made, pieces))
+        steps = tuple(streamed(made, parts))
         elapsed_s = time.perf_counter() - began_s
     return Counted(step_t_s=np.array([step.at_s for step in steps]), samples=len(block), elapsed_s=elapsed_s)
 
@@ -129,14 +129,15 @@ def _compile_once(made: KernelCounter, block: SampleBlock, spare: StepCounter) -
         _compiled.add(key)
 
 
-def _streamed(counter: StepCounter, pieces: list[SampleBlock]) -> list[Step]:
-    steps = [step for piece in pieces for step in counter.update(piece).steps]
+def streamed(counter: StepCounter, parts: Iterable[SampleBlock]) -> list[Step]:
+    """Count `parts`, a whole stream from its start to its end, one after the other."""
+    steps = [step for piece in parts for step in counter.update(piece).steps]
     return [*steps, *counter.finish().steps]
 
 
-def _pieces(block: SampleBlock) -> list[SampleBlock]:
-    """Cut `block` into lists that are short enough to go through plain Python."""
-    return [_part(block, first, first + COMPILED_FROM, as_lists=True) for first in range(0, len(block), COMPILED_FROM)]
+def pieces(block: SampleBlock, samples: int = COMPILED_FROM) -> list[SampleBlock]:
+    """Cut `block` into lists of `samples`, short enough to go through plain Python."""
+    return [_part(block, first, first + samples, as_lists=True) for first in range(0, len(block), samples)]
 
 
 def _part(block: SampleBlock, first: int, last: int, *, as_lists: bool) -> SampleBlock:

@@ -5,7 +5,7 @@
 
 from service.recordings.csv_file import write_csv
 from service.recordings.even import evenly_spaced, stated_rate_hz
-from service.recordings.formats import read, suffixes
+from service.recordings.formats import is_recording, read, suffixes
 from service.recordings.recording import Recording
 
-__all__ = ["Recording", "evenly_spaced", "read", "stated_rate_hz", "suffixes", "write_csv"]
+__all__ = ["Recording", "evenly_spaced", "is_recording", "read", "stated_rate_hz", "suffixes", "write_csv"]

@@ -16,14 +16,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from service.errors import RecordingError
 from service.recordings.recording import AXES, Floats, Recording, median_rate_hz, merge_repeated_stamps
+from service.recordings.text_table import header_cells, is_number, numbers, read_lines
 
 TIME = "time_s"
 ACC = tuple(f"{axis}_g" for axis in AXES)
@@ -35,6 +34,13 @@ TEXTS = ("placement", "activity", "subject", "quality")
 def recognises(head: bytes) -> bool:
     """Tell whether a file that begins with `head` is text."""
     return b"\0" not in head
+
+
+def names_acceleration(head: bytes) -> bool:
+    """Tell whether the header in `head`, the first line that is no comment, names a column of acceleration."""
+    lines = (line.strip() for line in head.decode("latin-1").lower().split("\n"))
+    header = next((line for line in lines if line and not line.startswith("#")), "")
+    return any(name.strip().strip('"') in ACC for name in header.removeprefix("ï»¿").split(","))
 
 
 def read_csv(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recording:  # noqa: ARG001
@@ -49,7 +55,7 @@ def read_csv(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recordin
         raise RecordingError(
             str(path), f"line {first - 1}: no column {', '.join(absent)}; the header must be {TIME},{','.join(ACC)}"
         )
-    table = _numbers(path, lines, first, columns, wanted)
+    table = numbers(path, lines, first=first, wanted=[columns.index(name) for name in wanted], names=columns)
     group = {name: table[:, wanted.index(name)] for name in wanted}
     rate = _declared_rate(path, about) or rate_hz
     t_s = _time(path, group, rate, len(table))
@@ -97,10 +103,7 @@ def _folded(text: str) -> str:
 
 def _split(path: Path) -> tuple[dict[str, str], list[str], int, list[str]]:
     """Return the comments, the header's names, the number of the first line of data, and the lines of data."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").split("\n")
-    except UnicodeDecodeError as error:
-        raise RecordingError(str(path), f"byte {error.start} is no UTF-8; save the file as UTF-8") from error
+    lines = read_lines(path)
     about: dict[str, str] = {}
     for number, line in enumerate(lines, start=1):
         text = line.strip()
@@ -108,52 +111,15 @@ def _split(path: Path) -> tuple[dict[str, str], list[str], int, list[str]]:
             key, _, value = text[1:].partition(":")
             about[key.strip()] = value.strip()
         elif text:
-            columns = [name.strip().strip('"').lower() for name in text.split(",")]
-            return about, columns, number + 1, lines[number:]
+            return about, header_cells(text), number + 1, lines[number:]
     raise RecordingError(str(path), f"no header; the first line must be {TIME},{','.join(ACC)}")
-
-
-def _numbers(path: Path, lines: Sequence[str], first: int, columns: list[str], wanted: list[str]) -> Floats:
-    """Return the wanted columns, one row a line that is not blank."""
-    where = [columns.index(name) for name in wanted]
-    rows = [line for line in lines if line.strip()]
-    if not rows:
-        raise RecordingError(str(path), "a header and no samples")
-    try:
-        table = np.loadtxt(rows, delimiter=",", comments=None, usecols=where, ndmin=2, dtype=np.float64)
-    except ValueError:
-        table = None
-    if table is None or not np.isfinite(table).all():
-        raise RecordingError(str(path), _bad_cell(lines, first, columns, wanted))
-    return table
-
-
-def _bad_cell(lines: Sequence[str], first: int, columns: list[str], wanted: list[str]) -> str:
-    for number, line in enumerate(lines, start=first):
-        cells = line.split(",")
-        if not line.strip():
-            continue
-        for name in wanted:
-            at = columns.index(name)
-            if at >= len(cells):
-                return f"line {number}: {len(cells)} columns, the header has {len(columns)}"
-            if not _is_number(cells[at]):
-                return f"line {number}, column {name}: {cells[at].strip()!r} is no finite number; remove the line"
-    return "a number cannot be read; write plain decimals"
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
 
 
 def _declared_rate(path: Path, about: dict[str, str]) -> float | None:
     if "rate_hz" not in about:
         return None
     text = about["rate_hz"]
-    if not _is_number(text) or float(text) <= 0:
+    if not is_number(text) or float(text) <= 0:
         raise RecordingError(str(path), f"# rate_hz: {text!r} is no rate above 0")
     return float(text)
 
@@ -176,7 +142,7 @@ def _step_times(path: Path, about: dict[str, str]) -> Floats | None:
     if "step_t_s" not in about:
         return None
     cells = about["step_t_s"].split()
-    wrong = [cell for cell in cells if not _is_number(cell)]
+    wrong = [cell for cell in cells if not is_number(cell)]
     if wrong:
         raise RecordingError(str(path), f"# step_t_s: {wrong[0]!r} is no time; seconds with blanks between are wanted")
     return np.array([float(cell) for cell in cells], dtype=np.float64)

@@ -27,29 +27,59 @@ class Reader(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """One format: the suffixes it goes by, what its first bytes look like, its reader."""
+    """One format: the suffixes it goes by, what its first bytes look like, its reader.
+
+    `meant` is the stricter look, at a file that nobody named: is it one at all, perhaps a damaged one?
+    """
 
     name: str
     suffixes: tuple[str, ...]
     recognises: Callable[[bytes], bool]
+    meant: Callable[[bytes], bool]
     read: Reader
 
 
 FORMATS: Final = (
-    Format(name="npz", suffixes=(".npz",), recognises=npz_file.recognises, read=npz_file.read_npz),
+    Format(
+        name="npz",
+        suffixes=(".npz",),
+        recognises=npz_file.recognises,
+        meant=lambda _: True,
+        read=npz_file.read_npz,
+    ),
     Format(
         name="paper",
         suffixes=(".csv", ".txt", ".tsv", ".dat"),
         recognises=paper_file.recognises,
+        meant=paper_file.recognises,
         read=paper_file.read_paper,
     ),
-    Format(name="csv", suffixes=(".csv", ".txt"), recognises=csv_file.recognises, read=csv_file.read_csv),
+    Format(
+        name="csv",
+        suffixes=(".csv", ".txt"),
+        recognises=csv_file.recognises,
+        meant=csv_file.names_acceleration,
+        read=csv_file.read_csv,
+    ),
 )
 
 
 def suffixes() -> frozenset[str]:
     """Return the file name endings `read` knows, in lower case, with the dot."""
     return frozenset(suffix for known in FORMATS for suffix in known.suffixes)
+
+
+def is_recording(path: Path) -> bool:
+    """Tell whether a file found in a folder is meant as a recording; a text without acceleration is not.
+
+    An empty or unreadable one is: `read` says what is wrong with it.
+    """
+    possible = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
+    try:
+        head = _head(path)
+    except OSError:
+        return bool(possible)
+    return any(not head.strip() or known.meant(head) for known in possible)
 
 
 def read(path: str | Path, *, lsb_per_g: float = paper_file.LSB_PER_G, rate_hz: float | None = None) -> Recording:
@@ -77,8 +107,7 @@ def read(path: str | Path, *, lsb_per_g: float = paper_file.LSB_PER_G, rate_hz: 
 
 
 def _recognised(path: Path, possible: Sequence[Format]) -> Format:
-    with path.open("rb") as file:
-        head = file.read(HEAD_BYTES)
+    head = _head(path)
     if not head.strip():
         raise RecordingError(str(path), "the file is empty")
     for known in possible:
@@ -86,3 +115,8 @@ def _recognised(path: Path, possible: Sequence[Format]) -> Format:
             return known
     expected = " or ".join(known.name for known in possible)
     raise RecordingError(str(path), f"the content is not what the ending {path.suffix!r} says ({expected})")
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(HEAD_BYTES)

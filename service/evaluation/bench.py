@@ -1,0 +1,190 @@
+"""How fast the counters are, beside two yardsticks of the same run: machines differ, ratios hardly.
+
+All on one core, the best of RUNS, numba's compilation excluded, 50 Hz columns of float64 in memory. The signal is a
+synthetic walk. `offline` counts all of it at once, `fast` with numba and `plain` without; `live` counts packets of ten
+samples. The yardsticks are `find_peaks`, what a textbook does with scipy, and `minimal loop`, the same job as one loop
+of numba that keeps nothing but the number. Chen 2015 prints what its three counters took for 5,000 samples, in MATLAB
+at 2.27 GHz.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeVar
+
+import numpy as np
+
+from service.counters import registry
+from service.counters.contract import StepCounter
+from service.counters.streaming import KernelCounter
+from service.evaluation import yardsticks
+from service.evaluation.counting import grid_block, pieces, streamed
+from service.recordings import read
+from service.samples import GRID_HZ, Packet, SampleBlock
+from service.signals.compiled import available, compiled
+from service.tracking.tracker import Tracker
+from service.wearables.bracelet import Bracelet
+
+RUNS: Final = 5
+
+SAMPLES: Final = 24 * 3600 * GRID_HZ
+"""A day."""
+
+PLAIN_SAMPLES: Final = 50_000
+"""Plain Python needs no day to show its speed."""
+
+FILE_SHARE: Final = 6
+"""The recording that is read and resampled is a sixth of the signal, at twice its rate."""
+
+PACKET_SAMPLES: Final = 10
+
+LIVE_FROM: Final = 300
+LIVE_PACKETS: Final = 800
+"""Packets that are timed, after the first minute: a counter has locked by then, and all of them are plain walking."""
+
+PAPER_SAMPLES: Final = 5000
+PAPER_S: Final = {"adaptive_peak": 0.036, "conventional_peak": 0.046, "autocorrelation": 0.131}
+
+WITHOUT_NUMBA: Final = "numba is missing, so there are no `fast` figures: pip install 'steplink[fast]'"
+
+Work = Callable[[], object]
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One measured value; units are `samples/s` of the 50 Hz grid, `us/packet` of ten samples, and `ratio`."""
+
+    name: str
+    value: float
+    unit: str
+
+
+def figures(counters: Sequence[str], samples: int = SAMPLES) -> Iterator[Figure]:
+    """Measure one figure after the other over a signal of `samples`; without numba, those that need it are left out."""
+    block = yardsticks.walk(samples)
+    yield from _offline(counters, block)
+    for name in counters:
+        yield _plain(name, block)
+        yield _live(f"{name} live", partial(registry.make, name), block)
+        if name in PAPER_S:
+            yield _paper(name, block)
+    yield _live_packets()
+    if available():
+        yield _from_file(yardsticks.head(block, samples // FILE_SHARE))
+
+
+def _offline(counters: Sequence[str], block: SampleBlock) -> Iterator[Figure]:
+    """Measure yardsticks and counters by turns, so that a machine that slows down slows all of them."""
+    sos = yardsticks.band()
+    works: dict[str, Work] = {"find_peaks": partial(yardsticks.textbook, block, sos)}
+    if available():
+        works["minimal loop"] = partial(compiled(yardsticks.minimal), *block.acc_g, sos)
+    peers = list(works)
+    if available():
+        works |= {name: partial(_count_fast, name, block) for name in counters}
+    best = best_of_each_s(works)
+    for peer in peers:
+        yield _speed(peer, len(block), best[peer])
+    for name in counters if available() else ():
+        yield _speed(f"{name} offline fast", len(block), best[name])
+        for peer in peers:
+            yield _ratio(f"{name} offline fast / {peer}", best[peer], best[name])
+
+
+def best_of_each_s(works: Mapping[str, Work]) -> dict[str, float]:
+    """Return the shortest of RUNS of each in seconds, taken by turns, after one that compiles and fills the caches."""
+    for work in works.values():
+        work()
+    runs = [{name: _seconds(work) for name, work in works.items()} for _ in range(RUNS)]
+    return {name: min(run[name] for run in runs) for name in works}
+
+
+def best_s(work: Work) -> float:
+    """Return the shortest of RUNS in seconds, after one that compiles and fills the caches."""
+    return best_of_each_s({"": work})[""]
+
+
+def _seconds(work: Work) -> float:
+    began_s = time.perf_counter()
+    work()
+    return time.perf_counter() - began_s
+
+
+def _speed(name: str, samples: int, took_s: float) -> Figure:
+    return Figure(name=name, value=samples / took_s, unit="samples/s")
+
+
+def _ratio(name: str, theirs_s: float, ours_s: float) -> Figure:
+    return Figure(name=name, value=theirs_s / ours_s, unit="ratio")
+
+
+def _count_fast(name: str, block: SampleBlock) -> object:
+    counter = registry.make(name)
+    return counter.count(block) if isinstance(counter, KernelCounter) else streamed(counter, [block])
+
+
+def _count_plain(name: str, parts: Iterable[SampleBlock]) -> object:
+    return streamed(registry.make(name), parts)
+
+
+def _plain(name: str, block: SampleBlock) -> Figure:
+    part = yardsticks.head(block, PLAIN_SAMPLES)
+    return _speed(f"{name} offline plain", len(part), best_s(partial(_count_plain, name, pieces(part))))
+
+
+def _paper(name: str, block: SampleBlock) -> Figure:
+    """Compare with the time that Chen 2015 prints."""
+    part = yardsticks.head(block, PAPER_SAMPLES)
+    work = partial(_count_fast, name, part) if available() else partial(_count_plain, name, pieces(part))
+    return _ratio(f"{name} 5,000 samples / Chen 2015", PAPER_S[name], best_s(work) * PAPER_SAMPLES / len(part))
+
+
+def _live(name: str, make: Callable[[], StepCounter], block: SampleBlock) -> Figure:
+    parts = pieces(yardsticks.head(block, (LIVE_FROM + LIVE_PACKETS) * PACKET_SAMPLES), PACKET_SAMPLES)
+    return _per_packet(name, parts, lambda: make().update)
+
+
+def _live_packets() -> Figure:
+    """Take a packet's whole way: codec, timebase, default counter."""
+    made = list(yardsticks.packets((LIVE_FROM + LIVE_PACKETS) * PACKET_SAMPLES, PACKET_SAMPLES))
+    name = registry.DEFAULT
+
+    def make() -> Callable[[Packet], object]:
+        return Tracker(Bracelet(), {name: partial(registry.make, name)}, primary=name).apply
+
+    return _per_packet(f"{name} live from bytes", made, make)
+
+
+def _per_packet(name: str, items: Sequence[Item], make: Callable[[], Callable[[Item], object]]) -> Figure:
+    """Time what `make` makes over the items from LIVE_FROM on, the ones before having gone through it."""
+    first = min(LIVE_FROM, len(items) // 2)
+
+    def run_s() -> float:
+        take = make()
+        for item in items[:first]:
+            take(item)
+        timed = items[first:]
+        began_s = time.perf_counter()
+        for item in timed:
+            take(item)
+        return time.perf_counter() - began_s
+
+    took_s = min(run_s() for _ in range(RUNS))
+    return Figure(name=name, value=took_s / (len(items) - first) * 1e6, unit="us/packet")
+
+
+def _from_file(block: SampleBlock) -> Figure:
+    """Read a recording, put it on the grid and count it; how many grid samples a second that makes."""
+    rate_hz = 2 * GRID_HZ
+    acc_g = np.repeat(np.column_stack([np.asarray(column) for column in block.acc_g]), 2, axis=0)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "walk.npz"
+        np.savez(path, t=np.arange(len(acc_g)) / rate_hz, acc=acc_g, rate_hz=rate_hz)
+        took_s = best_s(lambda: _count_fast(registry.DEFAULT, grid_block(read(path))))
+    return _speed(f"{registry.DEFAULT} offline fast with reading and resampling", len(block), took_s)

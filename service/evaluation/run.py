@@ -1,0 +1,159 @@
+"""Many recordings, each counted by each chosen counter, over all cores: a row each, whatever a file holds.
+
+A recording is read and put on the grid once, in a process of a pool; there each counter runs on one thread. What
+cannot be counted (a damaged file, a missing sensor, a rate under 10 Hz) is a row that says why.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from dataclasses import asdict, replace
+from typing import Final
+
+import numpy as np
+
+from service.counters import registry
+from service.errors import SteplinkError
+from service.evaluation.choices import Found
+from service.evaluation.counting import count, grid_block
+from service.evaluation.metrics import Times, match, metronome_s
+from service.evaluation.rows import Choice, Row
+from service.recordings import Recording, read
+from service.samples import SampleBlock
+
+PLATEAU_SAMPLES: Final = 3
+"""Equal samples in a row at the largest value of a recording: the sensor's range ended there."""
+
+PLATEAU_FROM_G: Final = 1.4
+"""A coarse sensor at rest repeats itself at 1 g; no sensor's range ends below 1.5 g."""
+
+Progress = Callable[[int, int], None]
+"""Is told how many recordings are done, and of how many."""
+
+
+async def evaluate(
+    found: Sequence[Found], chosen: Sequence[Choice], *, jobs: int, lsb_per_g: float, progress: Progress
+) -> list[Row]:
+    """Count every recording with every counter, `jobs` recordings at a time; rows in the order given.
+
+    `lsb_per_g` scales recordings in raw units. When cancelled, it ends its processes and returns at once.
+    """
+    # Not forked: threads of numba and asyncio do not outlive that.
+    pool = ProcessPoolExecutor(min(jobs, len(found)), mp_context=multiprocessing.get_context("spawn"))
+    done = 0
+
+    async def rows(file: Found, future: Future[list[Row]]) -> list[Row]:
+        nonlocal done
+        try:
+            made = await asyncio.wrap_future(future)
+        except BrokenExecutor:
+            made = failed_rows(file, chosen, "the process that counted it ended: is there memory enough for --jobs?")
+        done += 1
+        progress(done, len(found))
+        return made
+
+    try:
+        with _ctrl_c_ignored():
+            futures = [pool.submit(rows_of, file, chosen, lsb_per_g) for file in found]
+        by_file = await asyncio.gather(*(rows(file, future) for file, future in zip(found, futures, strict=True)))
+        return [row for made in by_file for row in made]
+    except asyncio.CancelledError:
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _ctrl_c_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C meanwhile: a process started here never heeds it, and leaves it to this one."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def rows_of(file: Found, chosen: Sequence[Choice], lsb_per_g: float) -> list[Row]:
+    """Read one recording and count it with each counter."""
+    try:
+        recording = read(file.path, lsb_per_g=lsb_per_g)
+        block = grid_block(recording)
+    except Exception as error:  # one recording must not end the others
+        return failed_rows(file, chosen, _told(error))
+    return [_row(file, recording, block, choice) for choice in chosen]
+
+
+def failed_rows(file: Found, chosen: Sequence[Choice], error: str) -> list[Row]:
+    """Return a row for each counter that says why there is no count."""
+    return [
+        Row(
+            path=file.shown,
+            dataset=file.dataset,
+            counter=choice.counter,
+            preset=choice.preset,
+            params=_params(choice),
+            changed=tuple(choice.overrides),
+            error=error,
+        )
+        for choice in chosen
+    ]
+
+
+def _row(file: Found, recording: Recording, block: SampleBlock, choice: Choice) -> Row:
+    true_s = None if recording.step_t_s is None else recording.step_t_s - recording.t_s[0]
+    true = len(true_s) if recording.true_steps is None and true_s is not None else recording.true_steps
+    row = Row(
+        path=file.shown,
+        dataset=file.dataset,
+        counter=choice.counter,
+        preset=choice.preset,
+        params=_params(choice),
+        changed=tuple(choice.overrides),
+        placement=recording.placement,
+        activity=recording.activity,
+        rate_hz=recording.rate_hz,
+        true_steps=true,
+        duration_s=recording.duration_s,
+        samples=len(block),
+        saturated=saturated(recording),
+    )
+    return _counted(row, block, choice, true_s)
+
+
+def _counted(row: Row, block: SampleBlock, choice: Choice, true_s: Times | None) -> Row:
+    """Return `row` with its count, or with the reason why there is none."""
+    try:
+        counted = count(block, choice.counter, choice.preset, choice.overrides)
+    except Exception as error:  # one counter must not end the others
+        return replace(row, error=_told(error))
+    row = replace(row, steps=counted.steps, elapsed_s=counted.elapsed_s)
+    if true_s is None:
+        return row
+    blind = match(metronome_s(counted.steps, true_s), true_s)
+    return replace(row, matches=match(counted.step_t_s, true_s), blind=blind)
+
+
+def saturated(recording: Recording) -> bool:
+    """Tell whether the sensor's range ended below what it felt: a plateau at the recording's largest value."""
+    size_g = np.abs(recording.acc_g)
+    top_g = size_g.max()
+    at_top = size_g == top_g
+    together = at_top[PLATEAU_SAMPLES - 1 :].copy()
+    for before in range(1, PLATEAU_SAMPLES):
+        together &= at_top[PLATEAU_SAMPLES - 1 - before : len(at_top) - before]
+    return bool(top_g >= PLATEAU_FROM_G and together.any())
+
+
+def _params(choice: Choice) -> dict[str, object]:
+    return asdict(registry.parameters(choice.counter, choice.preset, choice.overrides))
+
+
+def _told(error: Exception) -> str:
+    return str(error) if isinstance(error, SteplinkError) else f"{type(error).__name__}: {error}"
