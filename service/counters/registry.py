@@ -10,7 +10,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from service.counters import adaptive_peak, conventional_peak, double_threshold, gyro_zero_crossing, plus_minus
+from service.counters import (
+    adaptive_peak,
+    autocorrelation,
+    conventional_peak,
+    double_threshold,
+    gyro_zero_crossing,
+    plus_minus,
+)
 from service.counters.contract import StepCounter, with_overrides
 from service.errors import CounterError
 from service.samples import Sensor
@@ -46,6 +53,13 @@ _KINDS: Final = (
         double_threshold.build,
         paper=double_threshold.PAPER,
         tuned=double_threshold.TUNED,
+        sensors=ACCELEROMETER,
+    ),
+    _kind(
+        "autocorrelation",
+        autocorrelation.build,
+        paper=autocorrelation.PAPER,
+        tuned=autocorrelation.TUNED,
         sensors=ACCELEROMETER,
     ),
     _kind(

@@ -27,6 +27,16 @@ LIMITS = {
         "negatives_spar_watch": 3639,
         "negatives_banglejs": 290,
     },
+    "autocorrelation": {
+        "eth2023_wrist": 34.7,
+        "eth2022_wrist": 14.5,
+        "banglejs_walk": 7.5,
+        "pebble_wrist": 27.8,
+        "oxford_opt": 24.9,
+        "negatives_hmp": 1363,
+        "negatives_spar_watch": 4007,
+        "negatives_banglejs": 589,
+    },
     "gyro_zero_crossing": {
         "eth2023_wrist": 23.1,
         "eth2022_wrist": 10.6,
@@ -40,6 +50,7 @@ LIMITS = {
 
 DOCUMENTED = {
     "double_threshold": {"eth2023_wrist": 73.3, "eth2022_wrist": 20.3, "banglejs_walk": 19.4, "pebble_wrist": 13.4},
+    "autocorrelation": {"eth2023_wrist": 21.4, "eth2022_wrist": 31.9, "banglejs_walk": 23.1, "pebble_wrist": 13.2},
     "gyro_zero_crossing": {"eth2023_wrist": 69.8, "eth2022_wrist": 23.2, "dcaiti": 46.8, "brajdic_walk": 22.8},
 }
 """What `paper` gives, as the counter's module says."""
