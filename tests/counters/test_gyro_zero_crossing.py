@@ -309,6 +309,14 @@ def test_a_crossing_past_its_threshold_is_likely_at_once():
     assert len(build(SHARP).update(block_of(rate)).steps) == 1
 
 
+def test_a_bout_that_did_not_come_about_is_likely_no_more():
+    counter = build(replace(SHARP, bout=4, max_spacing_s=1.0, extremum_wait_s=0.5))
+    rate = lobes((0, 0.5), *swing(2), (0, 3.0))
+    pending = [counter.update(block_of([value], start=k)).pending for k, value in enumerate(rate)]
+    assert pending[70:100] == [2] * 30
+    assert pending[53 + 75 + 1 :] == [0] * (len(rate) - 53 - 75 - 1)
+
+
 @pytest.mark.parametrize(("bias", "learnt"), [(0.1, True), (-0.15, True), (0.3, False)])
 def test_the_rate_at_rest_is_subtracted_once_it_is_known(bias, learnt):
     trace = build(PAPER).update(block_of([bias] * 400)).trace
@@ -375,6 +383,12 @@ def test_a_calibrated_counter_counts_the_slowest_walk_it_learnt():
     noise = 0.03 * np.random.default_rng(3).standard_normal(len(walk))
     assert len(steps_of(PAPER, walk + noise)) == 0
     assert len(steps_of(calibrated(block_of(walk + noise), PAPER), walk + noise)) == pytest.approx(20, abs=1)
+
+
+def test_calibration_is_not_misled_by_a_long_stand():
+    standing = swing(200, height=0.01, seconds=0.2)
+    walk = lobes(*standing, *swing(10, height=1.0), (0.35, 0.5), (-0.35, 0.5), *swing(10, height=1.0))
+    assert calibrated(block_of(walk), SHARP).peak_rad_s == pytest.approx(0.8, abs=0.02)
 
 
 def test_calibration_leaves_out_what_the_hand_does():
