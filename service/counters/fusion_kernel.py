@@ -36,6 +36,7 @@ from service.counters.fusion_state import (
     HELD,
     KIND,
     LAGS,
+    LATEST,
     MAX_STEP,
     MOTION,
     NEVER,
@@ -204,7 +205,7 @@ def _extremum(s: State, kind: float, at: float, value: float, out: State, rows: 
     if s[KIND] == 0.0:
         since = s[HALF]
     else:
-        if since <= s[REJECT] * s[HALF]:
+        if since <= s[REJECT] * s[HALF] and since <= s[LATEST]:
             return rows
         rows = _final(s, int(at), out, rows)
         s[BEFORE], s[HALF] = s[AT], since

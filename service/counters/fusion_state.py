@@ -29,8 +29,9 @@ SHARE: Final = 13  # (17)
 SUSPECT_SHARE: Final = 14
 TRUST: Final = 15  # 1: the first three pass even when suspect
 BOUT: Final = 16
-FIRST_HALF: Final = 17  # samples: Δt₁ before there is one
-BANK: Final = 18
+LATEST: Final = 17  # samples: th_s is never longer
+FIRST_HALF: Final = 18  # samples: Δt₁ before there is one
+BANK: Final = 19
 """Five filters of `FILTER` floats: lag of their input, b₀, a₁, a₂ (b₁ = 2 b₀, b₂ = b₀)."""
 FILTER: Final = 4
 FILTERS: Final = 5

@@ -15,6 +15,7 @@ from service.counters import (
     autocorrelation,
     conventional_peak,
     double_threshold,
+    fusion,
     gyro_zero_crossing,
     plus_minus,
 )
@@ -69,6 +70,7 @@ _KINDS: Final = (
         tuned=gyro_zero_crossing.TUNED,
         sensors=GYROSCOPE,
     ),
+    _kind("fusion", fusion.build, paper=fusion.PAPER, tuned=fusion.TUNED, sensors=frozenset(Sensor)),
     _kind(
         "adaptive_peak",
         adaptive_peak.build,

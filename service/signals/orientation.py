@@ -96,11 +96,15 @@ def horizontal(s: State, o: int, x: float, y: float, z: float) -> tuple[float, f
 
 
 def _turned(x: float, y: float, z: float, wx: float, wy: float, wz: float) -> Three:
-    """Return v − ω × v Δt: a direction of the world after the body turned for one sample."""
+    """Return v − ω × v Δt + ω × (ω × v) Δt²/2: a direction of the world after the body turned for one sample.
+
+    The first order alone stretches what is at right angles to ω, and an arm's 5 rad/s then tilt v by 5° in a second.
+    """
+    tx, ty, tz = DT_S * (wy * z - wz * y), DT_S * (wz * x - wx * z), DT_S * (wx * y - wy * x)
     return (
-        x - DT_S * (wy * z - wz * y),
-        y - DT_S * (wz * x - wx * z),
-        z - DT_S * (wx * y - wy * x),
+        x - tx + 0.5 * DT_S * (wy * tz - wz * ty),
+        y - ty + 0.5 * DT_S * (wz * tx - wx * tz),
+        z - tz + 0.5 * DT_S * (wx * ty - wy * tx),
     )
 
 
