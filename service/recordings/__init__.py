@@ -6,6 +6,19 @@
 from service.recordings.csv_file import write_csv
 from service.recordings.even import evenly_spaced, stated_rate_hz
 from service.recordings.formats import is_recording, read, suffixes
+from service.recordings.mapped_file import ColumnMapping, TimeUnit, Unit, column_mapping
 from service.recordings.recording import Recording
 
-__all__ = ["Recording", "evenly_spaced", "is_recording", "read", "stated_rate_hz", "suffixes", "write_csv"]
+__all__ = [
+    "ColumnMapping",
+    "Recording",
+    "TimeUnit",
+    "Unit",
+    "column_mapping",
+    "evenly_spaced",
+    "is_recording",
+    "read",
+    "stated_rate_hz",
+    "suffixes",
+    "write_csv",
+]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Protocol
@@ -11,7 +11,18 @@ from typing import Final, Protocol
 import numpy as np
 
 from service.errors import ParameterError, RecordingError
-from service.recordings import csv_file, npz_file, paper_file
+from service.recordings import (
+    bangle_file,
+    clemson_file,
+    csv_file,
+    device_file,
+    mapped_file,
+    npz_file,
+    oxford_file,
+    oxwalk_file,
+    paper_file,
+)
+from service.recordings.mapped_file import ColumnMapping
 from service.recordings.recording import Recording
 
 HEAD_BYTES = 4096
@@ -39,6 +50,8 @@ class Format:
     read: Reader
 
 
+_TEXT: Final = (".csv", ".txt")
+
 FORMATS: Final = (
     Format(
         name="npz",
@@ -48,15 +61,57 @@ FORMATS: Final = (
         read=npz_file.read_npz,
     ),
     Format(
+        name="cwa",
+        suffixes=(".cwa",),
+        recognises=device_file.recognises_cwa,
+        meant=lambda _: True,
+        read=device_file.read_device,
+    ),
+    Format(
+        name="gt3x",
+        suffixes=(".gt3x",),
+        recognises=device_file.recognises_gt3x,
+        meant=lambda _: True,
+        read=device_file.read_device,
+    ),
+    Format(
         name="paper",
-        suffixes=(".csv", ".txt", ".tsv", ".dat"),
+        suffixes=mapped_file.SUFFIXES,
         recognises=paper_file.recognises,
         meant=paper_file.recognises,
         read=paper_file.read_paper,
     ),
     Format(
+        name="oxwalk",
+        suffixes=_TEXT,
+        recognises=oxwalk_file.recognises,
+        meant=oxwalk_file.recognises,
+        read=oxwalk_file.read_oxwalk,
+    ),
+    Format(
+        name="bangle",
+        suffixes=_TEXT,
+        recognises=bangle_file.recognises,
+        meant=bangle_file.recognises,
+        read=bangle_file.read_bangle,
+    ),
+    Format(
+        name="clemson",
+        suffixes=(".txt",),
+        recognises=clemson_file.recognises,
+        meant=clemson_file.recognises,
+        read=clemson_file.read_clemson,
+    ),
+    Format(
+        name="oxford",
+        suffixes=_TEXT,
+        recognises=oxford_file.recognises,
+        meant=oxford_file.recognises,
+        read=oxford_file.read_oxford,
+    ),
+    Format(
         name="csv",
-        suffixes=(".csv", ".txt"),
+        suffixes=_TEXT,
         recognises=csv_file.recognises,
         meant=csv_file.names_acceleration,
         read=csv_file.read_csv,
@@ -69,44 +124,58 @@ def suffixes() -> frozenset[str]:
     return frozenset(suffix for known in FORMATS for suffix in known.suffixes)
 
 
-def is_recording(path: Path) -> bool:
+def is_recording(path: Path, mapping: ColumnMapping | None = None) -> bool:
     """Tell whether a file found in a folder is meant as a recording; a text without acceleration is not.
 
-    An empty or unreadable one is: `read` says what is wrong with it.
+    An empty or unreadable one is: `read` says what is wrong with it. With `mapping`, a text is one that has them.
     """
-    possible = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
+    possible = _possible(path)
     try:
         head = _head(path)
     except OSError:
         return bool(possible)
+    if mapping and path.suffix.lower() in mapped_file.SUFFIXES:
+        return not head.strip() or mapped_file.has_columns(head, mapping)
     return any(not head.strip() or known.meant(head) for known in possible)
 
 
-def read(path: str | Path, *, lsb_per_g: float = paper_file.LSB_PER_G, rate_hz: float | None = None) -> Recording:
+def read(
+    path: str | Path,
+    *,
+    lsb_per_g: float = paper_file.LSB_PER_G,
+    rate_hz: float | None = None,
+    mapping: ColumnMapping | None = None,
+) -> Recording:
     """Read a recording of any known format.
 
     `lsb_per_g` scales formats that hold a sensor's counts; `rate_hz` is the rate of a file that does not say its own.
-    RecordingError says what is wrong with the file, where in it, and what to do; ParameterError refuses a rate or a
-    scale that is not above 0.
+    With `mapping`, every text is a table with those columns, whatever it looks like; other files say themselves what
+    they hold. RecordingError says what is wrong with the file, where in it, and what to do; ParameterError refuses a
+    rate or a scale that is not above 0.
     """
     for name, value in (("lsb_per_g", lsb_per_g), ("rate_hz", rate_hz)):
         if value is not None and not 0 < value < math.inf:
             raise ParameterError(name, value, "a finite number above 0 is wanted")
     path = Path(path)
-    possible = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
-    if not possible:
-        known_ones = ", ".join(sorted(suffixes()))
-        raise RecordingError(str(path), f"unknown ending {path.suffix!r}; known are {known_ones}")
     try:
-        known = _recognised(path, possible)
         # Values that overflow are found by the checks, which say where they are.
         with np.errstate(all="ignore"):
-            return known.read(path, lsb_per_g=lsb_per_g, rate_hz=rate_hz)
+            if mapping and path.suffix.lower() in mapped_file.SUFFIXES:
+                return mapped_file.read_mapped(path, mapping, rate_hz=rate_hz)
+            return _recognised(path).read(path, lsb_per_g=lsb_per_g, rate_hz=rate_hz)
     except OSError as error:
         raise RecordingError(str(path), error.strerror or str(error)) from error
 
 
-def _recognised(path: Path, possible: Sequence[Format]) -> Format:
+def _possible(path: Path) -> list[Format]:
+    return [known for known in FORMATS if path.suffix.lower() in known.suffixes]
+
+
+def _recognised(path: Path) -> Format:
+    possible = _possible(path)
+    if not possible:
+        known_ones = ", ".join(sorted(suffixes()))
+        raise RecordingError(str(path), f"unknown ending {path.suffix!r}; known are {known_ones}")
     head = _head(path)
     if not head.strip():
         raise RecordingError(str(path), "the file is empty")

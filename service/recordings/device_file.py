@@ -1,0 +1,122 @@
+"""Axivity's `.cwa` and ActiGraph's `.gt3x`, read by the library actfast (extra `devices`).
+
+| file | what it is | public description |
+| --- | --- | --- |
+| `.cwa` | AX3 and AX6: a header of 1024 bytes, blocks of 512 with 40, 80 or 120 samples | openmovement, `Docs/ax3` |
+| `.gt3x` | a zip of `info.txt` and `log.bin`, one record a second | github.com/actigraph/GT3X-File-Format |
+
+An Axivity block is stamped once, and its samples are laid at the nominal rate from there, although the sensor's own
+clock is some per cent off: the end of a block may then lie behind the next one's start. Here samples are spread evenly
+from one block's stamp to the next one's, as the makers' own software does. Stamps have no zone in either file and are
+taken as they are. Placement and subject come from the file where its owner wrote them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+from urllib.parse import parse_qs
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.errors import RecordingError
+from service.recordings.recording import Floats, Recording
+
+GAP: Final = 1.5
+"""A block that lasts this many times its nominal time is followed by a pause, which its samples must not be spread
+over. Ours; Axivity's clocks are at most a tenth off."""
+
+RESERVED_BYTES: Final = (1_600_000_000, 2_400_000_000, 200_000_000)
+"""What actfast 1.3 reserves for any `.gt3x`, however short. Where a machine refuses that, actfast ends the process, so
+it is asked for here before; none of it is touched."""
+
+CWA_MAGIC: Final = b"MD"
+ZIP_MAGIC: Final = b"PK"
+_INSTALL: Final = "its reader is not installed; run pip install 'steplink[devices]'"
+_NO_SAMPLES: Final = "it holds no acceleration that actfast knows; export it as CSV with the maker's software"
+
+
+def recognises_cwa(head: bytes) -> bool:
+    """Tell whether `head` is the beginning of an Axivity header."""
+    return head.startswith(CWA_MAGIC)
+
+
+def recognises_gt3x(head: bytes) -> bool:
+    """Tell whether `head` is the beginning of a zip, as every `.gt3x` is."""
+    return head.startswith(ZIP_MAGIC)
+
+
+def read_device(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recording:  # noqa: ARG001
+    """Read either; scale and rate are the file's, so the arguments say nothing.
+
+    RecordingError where the library is not installed, refuses the file or finds no samples in it.
+    """
+    try:
+        import actfast  # noqa: PLC0415
+    except ImportError as error:
+        raise RecordingError(str(path), _INSTALL) from error
+    if path.suffix.lower() == ".gt3x":
+        _check_memory(path)
+    try:
+        found = actfast.read(path)
+    except ValueError as error:
+        raise RecordingError(str(path), f"actfast cannot read it: {error}") from error
+    tables = [table for table in found["timeseries"].values() if len(table.get("acceleration", ()))]
+    if not tables:
+        raise RecordingError(str(path), _NO_SAMPLES)
+    table = tables[0]
+    t_ns = table["datetime"]
+    gyro_deg_s = table.get("gyroscope")
+    placement, subject = _worn(found["metadata"])
+    return Recording(
+        path=path,
+        t_s=_spread(t_ns),
+        acc_g=table["acceleration"].astype(np.float64),
+        rate_hz=_nominal_hz(t_ns),
+        gyro_rad_s=None if gyro_deg_s is None else np.deg2rad(gyro_deg_s.astype(np.float64)),
+        placement=placement,
+        subject=subject,
+    )
+
+
+def _check_memory(path: Path) -> None:
+    try:
+        _ = [np.empty(size, dtype=np.uint8) for size in RESERVED_BYTES]
+    except MemoryError as error:
+        why = f"actfast reserves {sum(RESERVED_BYTES) / 1e9:.1f} GB to read a .gt3x, which this machine refuses"
+        raise RecordingError(str(path), f"{why}; export it as CSV with the maker's software") from error
+
+
+def _nominal_hz(t_ns: NDArray[np.int64]) -> float:
+    """Return the rate most samples are laid at, in whole hundredths; 1 where there is none, which is refused later."""
+    spacing_ns = float(np.median(np.diff(t_ns))) if len(t_ns) > 1 else 0.0
+    return round(1e9 / spacing_ns, 2) if spacing_ns > 0 else 1.0
+
+
+def _spread(t_ns: NDArray[np.int64]) -> Floats:
+    """Return seconds after the first sample, every block's samples even up to the next block, pauses kept."""
+    seconds = np.asarray((t_ns - t_ns[0]) / 1e9, dtype=np.float64)
+    steps = np.diff(seconds)
+    if not len(steps):
+        return seconds
+    nominal_s = float(np.median(steps))
+    starts = np.flatnonzero(np.abs(steps - nominal_s) > 1e-6) + 1
+    edges = np.concatenate(([0], starts))
+    samples = np.diff(np.append(edges, len(seconds)))
+    lasts_s = np.diff(seconds[edges], append=np.inf)
+    even = (lasts_s > 0) & (lasts_s < GAP * nominal_s * samples)
+    spacing_s = np.where(even, lasts_s / samples, nominal_s)
+    place = np.arange(len(seconds)) - np.repeat(edges, samples)
+    spread: Floats = np.repeat(seconds[edges], samples) + np.repeat(spacing_s, samples) * place
+    return spread
+
+
+def _worn(metadata: Mapping[str, Mapping[str, str]]) -> tuple[str | None, str | None]:
+    """Return placement and subject as written in Axivity's annotation (`_p=left+wrist&_sc=7`) or ActiGraph's info."""
+    annotation = parse_qs(metadata.get("session", {}).get("annotation", ""))
+    info = metadata.get("info", {})
+    placement = (annotation.get("_p") or [f"{info.get('Side', '')} {info.get('Limb', '')}"])[0]
+    subject = (annotation.get("_sc") or [info.get("Subject Name", "")])[0]
+    return placement.strip().lower() or None, subject.strip() or None
