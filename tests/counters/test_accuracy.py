@@ -45,6 +45,13 @@ LIMITS = {
         "negatives_spar_watch": 2517,
         "brajdic_handling": 1068,
     },
+    "fusion": {
+        "eth2023_wrist": 8.5,
+        "eth2022_wrist": 17.9,
+        "dcaiti": 1.8,
+        "brajdic_walk": 3.6,
+        "brajdic_handling": 385,
+    },
 }
 """Mean absolute percentage error over the recordings that hold steps, or false steps an hour where a set holds none."""
 
@@ -52,6 +59,7 @@ DOCUMENTED = {
     "double_threshold": {"eth2023_wrist": 73.3, "eth2022_wrist": 20.3, "banglejs_walk": 19.4, "pebble_wrist": 13.4},
     "autocorrelation": {"eth2023_wrist": 21.4, "eth2022_wrist": 31.9, "banglejs_walk": 23.1, "pebble_wrist": 13.2},
     "gyro_zero_crossing": {"eth2023_wrist": 69.8, "eth2022_wrist": 23.2, "dcaiti": 46.8, "brajdic_walk": 22.8},
+    "fusion": {"eth2023_wrist": 54.4, "eth2022_wrist": 46.3, "dcaiti": 11.8, "brajdic_walk": 22.4},
 }
 """What `paper` gives, as the counter's module says."""
 
