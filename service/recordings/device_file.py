@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -23,6 +23,9 @@ from numpy.typing import NDArray
 
 from service.errors import RecordingError
 from service.recordings.recording import Floats, Recording
+
+if TYPE_CHECKING:
+    from actfast import ActfastResult
 
 GAP: Final = 1.5
 """A block that lasts this many times its nominal time is followed by a pause, which its samples must not be spread
@@ -34,6 +37,7 @@ it is asked for here before; none of it is touched."""
 
 CWA_MAGIC: Final = b"MD"
 ZIP_MAGIC: Final = b"PK"
+_PANIC_MODULE: Final = "pyo3_runtime"
 _INSTALL: Final = "its reader is not installed; run pip install 'steplink[devices]'"
 _NO_SAMPLES: Final = "it holds no acceleration that actfast knows; export it as CSV with the maker's software"
 
@@ -53,16 +57,7 @@ def read_device(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recor
 
     RecordingError where the library is not installed, refuses the file or finds no samples in it.
     """
-    try:
-        import actfast  # noqa: PLC0415
-    except ImportError as error:
-        raise RecordingError(str(path), _INSTALL) from error
-    if path.suffix.lower() == ".gt3x":
-        _check_memory(path)
-    try:
-        found = actfast.read(path)
-    except ValueError as error:
-        raise RecordingError(str(path), f"actfast cannot read it: {error}") from error
+    found = _load(path)
     tables = [table for table in found["timeseries"].values() if len(table.get("acceleration", ()))]
     if not tables:
         raise RecordingError(str(path), _NO_SAMPLES)
@@ -79,6 +74,24 @@ def read_device(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recor
         placement=placement,
         subject=subject,
     )
+
+
+def _load(path: Path) -> ActfastResult:
+    try:
+        import actfast  # noqa: PLC0415
+    except ImportError as error:
+        raise RecordingError(str(path), _INSTALL) from error
+    if path.suffix.lower() == ".gt3x":
+        _check_memory(path)
+    try:
+        return actfast.read(path)
+    except ValueError as error:
+        raise RecordingError(str(path), f"actfast cannot read it: {error}") from error
+    except BaseException as error:
+        # A panic of Rust code is no Exception, and its class has no name that can be imported.
+        if type(error).__module__ != _PANIC_MODULE:
+            raise
+        raise RecordingError(str(path), f"actfast cannot read it, the file is damaged: {error}") from error
 
 
 def _check_memory(path: Path) -> None:

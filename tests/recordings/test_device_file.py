@@ -1,6 +1,7 @@
 """Axivity's and ActiGraph's files: values, times, pauses, clocks that run fast, and files that are none."""
 
 import builtins
+import struct
 
 import numpy as np
 import pytest
@@ -103,6 +104,30 @@ def test_records_that_the_library_passes_over_are_no_empty_recording(tmp_path):
 def test_what_is_wrong_is_named(tmp_path, name, content, says):
     with pytest.raises(RecordingError, match=says):
         read(written(tmp_path, content, name))
+
+
+def one_axis_short():
+    """Return a file whose block claims two axes of two bytes, its checksum right."""
+    content = bytearray(cwa(walk(80)))
+    content[1024 + 25] = 0x22
+    total = sum(struct.unpack_from("<255H", content, 1024)) & 0xFFFF
+    struct.pack_into("<H", content, 1024 + 510, -total & 0xFFFF)
+    return bytes(content)
+
+
+def test_a_file_that_makes_the_library_panic_ends_in_an_error(tmp_path):
+    """What Rust raises then is no Exception, and would end a program."""
+    with pytest.raises(RecordingError, match="the file is damaged: index out of bounds"):
+        read(written(tmp_path, one_axis_short(), "a.cwa"))
+
+
+def test_an_interrupt_while_reading_stays_one(tmp_path, monkeypatch):
+    def interrupted(_path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("actfast.read", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        read(written(tmp_path, cwa(walk(80)), "a.cwa"))
 
 
 def test_without_the_library_the_error_says_how_to_get_it(tmp_path, monkeypatch):
