@@ -16,7 +16,7 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", nargs="*", help="a recording, or a folder that is searched through")
     _add_counter(parser, "counters to evaluate, or all (default double_threshold)")
     parser.add_argument(
-        "--preset", choices=("paper", "tuned"), default="tuned", help="their parameters (default tuned)"
+        "--preset", choices=("paper", "tuned"), help="their parameters (default tuned, with --paper the published ones)"
     )
     parser.add_argument(
         "--param",
@@ -26,6 +26,15 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         help="change one parameter of one counter, as in double_threshold.bout=3; may be repeated",
     )
     _add_json(parser, "write a row for each recording and counter there")
+    parser.add_argument(
+        "--paper",
+        metavar="NAME",
+        help="print the tables of wang2018, chen2015, jayalath2013 or khedr2017, published figures beside ours, on"
+        " synthetic walkers and on recordings of the same conditions (PATH, else those of STEPLINK_DATA)",
+    )
+    parser.add_argument(
+        "--figures", metavar="DIR", help="draw the papers' figures and the agreement there, as PNG (extra: figures)"
+    )
     cores = os.cpu_count() or 1
     parser.add_argument(
         "--jobs", type=_whole(1, 256), default=cores, help=f"recordings counted at once (default {cores}, the cores)"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Sequence
 from typing import Final
 
 from service.counters import registry
 from service.errors import ParameterError
-from service.evaluation.choices import Found
+from service.evaluation.choices import Found, find
 from service.evaluation.papers import PAPERS
 from service.evaluation.papers.conditions import Paper
 from service.evaluation.papers.real import Measured, choice, measured, methods, wanted
@@ -16,34 +17,42 @@ from service.evaluation.papers.report import Report
 from service.evaluation.papers.results import Result, results, timings, walkers
 from service.evaluation.run import Progress, evaluate
 
+DATA: Final = "STEPLINK_DATA"
 PRESET: Final = "paper"
 """The published parameters, where none are asked for."""
 
 
-def paper(name: str) -> Paper:
-    """Return the paper of that name; ParameterError lists the known ones."""
+def asked(name: str, counters: Sequence[str], params: Sequence[str]) -> Paper:
+    """Return the paper of that name; ParameterError where there is none, or where its counters are chosen too."""
     if name not in PAPERS:
         raise ParameterError("paper", name, f"one of {', '.join(PAPERS)}")
+    if counters or params:
+        raise ParameterError("paper", name, "it says itself which counters: leave --counter and --param out")
     return PAPERS[name]
 
 
+def recordings(paths: Sequence[str]) -> list[Found]:
+    """Return the recordings at `paths`, else those of the folder that STEPLINK_DATA names, else none."""
+    folder = os.environ.get(DATA)
+    named = list(paths) or ([folder] if folder else [])
+    return find(named)[0] if named else []
+
+
 async def report(
-    name: str, found: Sequence[Found], preset: str = PRESET, *, jobs: int, lsb_per_g: float, progress: Progress
+    of: Paper, found: Sequence[Found], preset: str = PRESET, *, jobs: int, lsb_per_g: float, progress: Progress
 ) -> Report:
     """Count a paper's conditions on synthetic walkers and on those of the recordings `found` that have them.
 
-    ParameterError where there is no such paper; recordings that cannot be read are passed over. When cancelled it
-    stops within a walk.
+    Recordings that cannot be read are passed over. When cancelled it stops within a walk.
     """
-    asked = paper(name)
-    made = await _synthetic(asked, preset, progress)
-    real = await _real(asked, found, preset, jobs, lsb_per_g, progress) if found else None
-    return Report(paper=asked, preset=preset, results=made, measured=real, timings=timings(asked, preset))
+    made = await _synthetic(of, preset, progress)
+    real = await _real(of, found, preset, jobs, lsb_per_g, progress) if found else None
+    return Report(paper=of, preset=preset, results=made, measured=real, timings=timings(of, preset))
 
 
-async def _synthetic(asked: Paper, preset: str, progress: Progress) -> list[Result]:
-    made, done, total = [], 0, walkers(asked)
-    for result in results(asked, preset):
+async def _synthetic(of: Paper, preset: str, progress: Progress) -> list[Result]:
+    made, done, total = [], 0, walkers(of)
+    for result in results(of, preset):
         if result is None:
             done += 1
             progress(done, total)
@@ -54,12 +63,12 @@ async def _synthetic(asked: Paper, preset: str, progress: Progress) -> list[Resu
 
 
 async def _real(
-    asked: Paper, found: Sequence[Found], preset: str, jobs: int, lsb_per_g: float, progress: Progress
+    of: Paper, found: Sequence[Found], preset: str, jobs: int, lsb_per_g: float, progress: Progress
 ) -> list[Measured]:
-    used = [method for method in methods(asked) if method.counter in registry.COUNTERS]
-    files = await asyncio.to_thread(wanted, asked, found, lsb_per_g)
+    used = [method for method in methods(of) if method.counter in registry.COUNTERS]
+    files = await asyncio.to_thread(wanted, of, found, lsb_per_g)
     if not used or not files:
         return []
     chosen = [choice(method, preset) for method in used]
     rows = await evaluate(files, chosen, jobs=jobs, lsb_per_g=lsb_per_g, progress=progress)
-    return measured(asked, list(zip(used * len(files), rows, strict=True)))
+    return measured(of, list(zip(used * len(files), rows, strict=True)))

@@ -1,0 +1,182 @@
+"""The figures: one file a name, drawn, the same again; their numbers where a picture cannot be read."""
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+from evaluation.made import save, still, walk
+
+from service.errors import ParameterError
+from service.evaluation.choices import find
+from service.evaluation.figures import agreement, bracelet, canvas, draw, phones
+from service.evaluation.figures.sources import cut, middle, sources, times_s
+from service.evaluation.rows import Row
+from service.samples import GRID_HZ
+
+matplotlib = pytest.importorskip("matplotlib")
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def row(**changes):
+    base = Row(
+        path="a", dataset="set", counter="double_threshold", preset="paper", params={}, true_steps=100, steps=95,
+        duration_s=60.0, samples=3000, elapsed_s=0.001,
+    )  # fmt: skip
+    return dataclasses.replace(base, **changes)
+
+
+ROWS = [
+    row(),
+    row(path="b", steps=110, dataset="other"),
+    row(path="b", counter="adaptive_peak", steps=80),
+    row(path="c", true_steps=0, steps=4),
+    row(path="d", steps=None, error="broken"),
+]
+
+
+@pytest.fixture(autouse=True)
+def _in_plain_python(monkeypatch):
+    """Count without numba, which takes seconds to compile and changes no step."""
+    monkeypatch.setattr("service.counters.streaming.compiled", lambda kernel: kernel)
+
+
+@pytest.fixture(scope="module")
+def of():
+    return sources([], 32.0)
+
+
+@pytest.fixture
+def seen(monkeypatch):
+    """Axes as they were drawn, by path."""
+    kept = {}
+    drawn = canvas.picture
+
+    def keep(path, paint, **options):
+        def paint_and_keep(axes):
+            paint(axes)
+            kept[path.stem] = axes
+
+        return drawn(path, paint_and_keep, **options)
+
+    for module in (agreement, bracelet, phones):
+        monkeypatch.setattr(module, "picture", keep)
+    return kept
+
+
+def test_every_figure_is_written_once_and_is_no_blank(tmp_path, seen, monkeypatch):
+    monkeypatch.setattr(canvas, "DPI", 50)
+    written = draw.write(canvas.checked_folder(str(tmp_path / "new")), ROWS, [], lsb_per_g=32.0)
+    assert [path.stem for path in written] == [*draw.SIGNALS, *draw.RESULTS]
+    assert {path.name for path in (tmp_path / "new").iterdir()} == {path.name for path in written}
+    for path in written:
+        assert path.read_bytes().startswith(PNG)
+        image = matplotlib.image.imread(path)[..., :3]
+        assert 0.003 < (image < 0.9).any(axis=2).mean() < 0.9, path
+    for name, axes in seen.items():
+        assert axes[-1].get_xlabel() or name in {"accuracy", "timing"}, name
+        assert all(each.get_ylabel() for each in axes), name
+        assert any(mark in axes[-1].get_ylabel() for mark in ("/", "counted")), name
+
+
+def test_the_same_numbers_give_the_same_bytes(tmp_path, of):
+    once, again = (bracelet.thresholds(tmp_path / f"{name}.png", of.walk).read_bytes() for name in "ab")
+    assert once == again
+
+
+def test_without_walks_only_the_time_is_drawn(tmp_path, of, monkeypatch):
+    monkeypatch.setattr(draw, "sources", lambda *_: of)
+    monkeypatch.setattr(draw, "SIGNALS", {})
+    assert [path.stem for path in draw.write(tmp_path, [row(true_steps=0)], [], lsb_per_g=32.0)] == ["timing"]
+    assert draw.write(tmp_path, [row(steps=None, error="broken")], [], lsb_per_g=32.0) == []
+
+
+def test_a_missing_matplotlib_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(ParameterError, match=r"pip install 'steplink\[figures\]'"):
+        canvas.checked_folder(str(tmp_path))
+
+
+def test_a_folder_that_cannot_be_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ParameterError, match="no folder can be made there"):
+        canvas.checked_folder(str(tmp_path / "file"))
+
+
+# From what they are drawn
+
+
+def test_recordings_come_before_walkers(tmp_path):
+    save(walk(30.0), tmp_path / "mine" / "a.npz", activity="walk")
+    save(still(30.0), tmp_path / "mine" / "b.npz", activity="rest")
+    (tmp_path / "mine" / "c.npz").write_bytes(b"PK\x03\x04 no archive")
+    chosen = sources(find([str(tmp_path)])[0], 32.0)
+    assert (chosen.walk.name, chosen.walk.true_steps) == ("mine/a.npz", 60)
+    assert chosen.rest.name == "mine/b.npz"
+    assert chosen.run.name == "synthetic run"
+    assert chosen.pocket.signal.gyro_rad_s is not None
+
+
+def test_the_middle_of_a_source_is_cut_at_its_own_times(of):
+    part = middle(of.walk, 4.0)
+    piece = cut(of.walk.signal, part.start, part.stop)
+    assert (len(piece), piece.start - of.walk.signal.start) == (200, part.start)
+    assert times_s(part)[0] == part.start / GRID_HZ
+    assert np.array_equal(np.column_stack(piece.acc_g), of.walk.acc_g[part])
+    assert middle(of.walk, 1e6) == slice(0, len(of.walk.signal))
+
+
+# What they show
+
+
+def test_thresholds_lie_over_each_other_and_steps_above(of):
+    view = bracelet.counted(of.walk)
+    assert len(view.steps) == pytest.approx(of.walk.true_steps, rel=0.2)
+    assert all(band.lower < band.upper for band in view.bands)
+    assert all(step.peak > step.upper for step in view.steps)
+    at_peak = np.interp([step.at_s for step in view.steps], view.t_s + of.walk.signal.start / GRID_HZ, view.filtered_g)
+    assert np.allclose(at_peak, [step.peak for step in view.steps])
+
+
+def test_step_maxima_tell_a_walk_from_a_run(of):
+    walking, running = phones.step_maxima_g(of.walk), phones.step_maxima_g(of.run)
+    assert len(walking) == of.walk.true_steps
+    assert ((walking >= phones.WALK_G) & (walking <= phones.RUN_G)).mean() > 0.9
+    assert (running > phones.RUN_G).mean() > 0.9
+
+
+def test_a_gait_cycle_is_two_steps(tmp_path, of, seen):
+    phones.gait_cycle(tmp_path / "cycle.png", of.pocket)
+    dashed = [line.get_xdata()[0] for line in seen["cycle"][0].lines if line.get_linestyle() == "--"]
+    cycle_s = np.diff(dashed).mean()
+    assert cycle_s == pytest.approx(2 * len(of.pocket.signal) / GRID_HZ / of.pocket.true_steps, rel=0.15)
+
+
+def test_bias_and_limits_are_bland_and_altmans(tmp_path, seen):
+    rows = [row(path=str(k), steps=100 + error) for k, error in enumerate((-4, 0, 4, 8))]
+    agreement.bland_altman(tmp_path / "ba.png", rows)
+    levels = sorted(line.get_ydata()[0] for line in seen["ba"][0].lines if len(line.get_xdata()) == 2)
+    sd = np.std([-4, 0, 4, 8], ddof=1)
+    assert levels == pytest.approx([2 - 1.96 * sd, 2, 2 + 1.96 * sd])
+
+
+def test_bars_stand_at_the_mean_accuracy_of_each_set(tmp_path, seen):
+    agreement.accuracy(tmp_path / "bars.png", ROWS)
+    heights = [[bar.get_height() for bar in bars] for bars in seen["bars"][0].containers]
+    assert heights[0] == pytest.approx([95.0, 90.0])
+    assert heights[1][0] == pytest.approx(80.0)
+    assert np.isnan(heights[1][1])
+
+
+def test_cadence_is_true_steps_a_minute(tmp_path, seen):
+    agreement.error_by_cadence(tmp_path / "cadence.png", ROWS)
+    line = seen["cadence"][0].lines[0]
+    assert (line.get_xdata()[0], line.get_ydata()[0]) == (100.0, -5.0)
+
+
+def test_times_are_of_5000_samples_and_stand_beside_the_published(tmp_path, seen):
+    agreement.timing(tmp_path / "time.png", [row(), row(counter="adaptive_peak", elapsed_s=0.003)])
+    here, published = seen["time"][0].containers
+    assert [bar.get_height() for bar in here] == pytest.approx([0.001 * 5 / 3, 0.005])
+    assert [bar.get_height() for bar in published] == [0.036]
