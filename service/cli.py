@@ -24,8 +24,12 @@ from service.config import Settings
 from service.errors import LinkError, SteplinkError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from device_sim.gatt import GattBracelet
     from device_sim.source import Source
+    from service.evaluation.choices import Found
+    from service.evaluation.rows import Row
     from service.links.ble import Backend
     from service.pipeline.supervisor import Supervisor
 
@@ -116,17 +120,60 @@ async def _evaluate(options: argparse.Namespace) -> int:
     from service.evaluation.run import evaluate  # noqa: PLC0415
     from service.evaluation.tables import report  # noqa: PLC0415
 
+    if options.paper is not None:
+        await _evaluate_paper(options)
+        return 0
     names, paths = choices.counters_and_paths(options.counter, options.path)
-    chosen = choices.choices(names, options.preset, options.param)
+    chosen = choices.choices(names, options.preset or "tuned", options.param)
     found, passed = choices.find(paths)
-    output = json_file.checked_path(options.json)
+    output, folder = json_file.checked_path(options.json), _figures_folder(options)
     if passed:
         print(f"steplink: passed over texts without acceleration: {', '.join(passed)}", file=sys.stderr)
     with ProgressBar() as progress:
         rows = await evaluate(found, chosen, jobs=options.jobs, lsb_per_g=options.lsb_per_g, progress=progress)
     print(report(rows))
     json_file.write_json(output, (row.as_json() for row in rows))
+    await _draw(folder, rows, found, options)
     return NOTHING_COUNTED if all(row.error for row in rows) else 0
+
+
+async def _evaluate_paper(options: argparse.Namespace) -> None:
+    """Print a paper's tables, its figures beside ours."""
+    from service.evaluation import json_file  # noqa: PLC0415
+    from service.evaluation.papers import run  # noqa: PLC0415
+    from service.evaluation.progress import ProgressBar  # noqa: PLC0415
+
+    asked = run.asked(options.paper, options.counter, options.param)
+    found = run.recordings(options.path)
+    output, folder = json_file.checked_path(options.json), _figures_folder(options)
+    with ProgressBar() as progress:
+        made = await run.report(
+            asked,
+            found,
+            options.preset or run.PRESET,
+            jobs=options.jobs,
+            lsb_per_g=options.lsb_per_g,
+            progress=progress,
+        )
+    print(made.text())
+    json_file.write_json(output, made.as_json())
+    await _draw(folder, made.rows, found, options)
+
+
+def _figures_folder(options: argparse.Namespace) -> Path | None:
+    from service.evaluation.figures.canvas import checked_folder  # noqa: PLC0415
+
+    return None if options.figures is None else checked_folder(options.figures)
+
+
+async def _draw(folder: Path | None, rows: Sequence[Row], found: Sequence[Found], options: argparse.Namespace) -> None:
+    """Draw the figures where a folder for them was named."""
+    if folder is None:
+        return
+    from service.evaluation.figures.draw import write  # noqa: PLC0415
+
+    written = await asyncio.to_thread(write, folder, rows, found, lsb_per_g=options.lsb_per_g)
+    print(f"steplink: {len(written)} figures in {folder}: {', '.join(path.stem for path in written)}", file=sys.stderr)
 
 
 async def _bench(options: argparse.Namespace) -> None:
