@@ -68,22 +68,42 @@ def test_the_folder_says_where_the_phone_was(tmp_path, name, placement, activity
     assert (recording.true_steps, recording.step_t_s, recording.quality) == (None, None, None)
 
 
-BOUNCING_S = sorted(LEFT_S + [step + 0.4 for step in LEFT_S[:5]])
-STICKING_S = [step for step in LEFT_S if not 3.5 < step < 6.5]
+LONG_S = [float(second) for second in range(1, 29)]
+LONG_RIGHT_S = [step + 0.5 for step in LONG_S]
+
+
+def bouncing(steps, bounces):
+    """Return `steps` with a second contact after 0.4 s at the first `bounces` of them."""
+    return sorted(steps + [step + 0.4 for step in steps[:bounces]])
 
 
 @pytest.mark.parametrize(
     ("left_s", "right_s"),
     [
-        (BOUNCING_S, sorted(RIGHT_S + [step + 0.4 for step in RIGHT_S[:4]])),
-        (STICKING_S, RIGHT_S),
-        (LEFT_S[:5], RIGHT_S),
+        (bouncing(LONG_S, 3), bouncing(LONG_RIGHT_S, 2)),
+        ([step for step in LONG_S if not 3.5 < step < 6.5], LONG_RIGHT_S),
+        (LONG_S[:24], LONG_RIGHT_S),
     ],
-    ids=["bounces", "sticks", "feet apart"],
+    ids=["five bounces", "three strides left out", "feet four steps apart"],
 )
 def test_switches_not_to_be_trusted_give_a_number_and_no_times(tmp_path, left_s, right_s):
-    recording = read(folder(tmp_path, stepcounter=switches(left_s, right_s)))
+    recording = read(folder(tmp_path, stepcounter=switches(left_s, right_s, 30.0)))
     assert (recording.true_steps, recording.step_t_s, recording.quality) == (len(left_s) + len(right_s), None, "B")
+
+
+@pytest.mark.parametrize(
+    ("left_s", "right_s"),
+    [
+        (bouncing(LONG_S, 2), bouncing(LONG_RIGHT_S, 2)),
+        ([step for step in LONG_S if not 3.5 < step < 5.5], LONG_RIGHT_S),
+        (LONG_S[:25], LONG_RIGHT_S),
+    ],
+    ids=["four bounces", "two strides left out", "feet three steps apart"],
+)
+def test_a_little_less_is_trusted(tmp_path, left_s, right_s):
+    recording = read(folder(tmp_path, stepcounter=switches(left_s, right_s, 30.0)))
+    assert np.allclose(recording.step_t_s, sorted(left_s + right_s))
+    assert recording.quality == "A"
 
 
 @pytest.mark.parametrize(

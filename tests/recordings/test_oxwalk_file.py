@@ -41,6 +41,12 @@ def test_a_file_of_the_data_set(tmp_path, placement, rate_hz):
     assert np.allclose(recording.step_t_s, [100 / rate_hz, 160 / rate_hz, 221 / rate_hz])
 
 
+def test_a_byte_order_mark_hides_nothing(tmp_path):
+    path = written(tmp_path, "\ufeff" + HEADER + rows())
+    assert is_recording(path)
+    assert read(path).true_steps == 3
+
+
 def test_an_hour_without_a_step_has_none(tmp_path):
     recording = read(written(tmp_path, HEADER + rows(steps=())))
     assert (recording.true_steps, len(recording.step_t_s)) == (0, 0)
