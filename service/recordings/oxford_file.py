@@ -28,8 +28,8 @@ MAX_FEET_APART: Final = 3
 """Feet alternate: larger differences in their steps are a switch that bounces or sticks."""
 MAX_BOUNCES: Final = 4
 MAX_MISSED: Final = 2
-"""More strides under half, or more left out of longer ones, than these make the truth approximate. Ours, on the 48
-walks of `optimisation/`: it parts those we trust from those we do not as their later repair by hand did."""
+"""More strides under half, or more left out of longer ones, than these make the truth approximate. Ours: it parts the
+35 walks of `optimisation/` whose steps we trust from the 13 whose switches needed repair."""
 
 _STAMP: Final = r"\d{6,19}"
 _NUMBER: Final = r"-?\d+(?:\.\d+)?(?:[eE]-?\d+)?"
