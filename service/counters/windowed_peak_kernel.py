@@ -52,10 +52,11 @@ M3: Final = 27
 M4: Final = 28
 SMOOTHED: Final = 29  # the sample before
 RISE_AT: Final = 30  # index of the last rise; −1 since a fall
-COUNT: Final = 31  # tops in the queue
-DUE: Final = 32  # when the oldest is judged; −1 none waits
+FALLS: Final = 31  # pairs of the stretch that fall
+COUNT: Final = 32  # tops in the queue
+DUE: Final = 33  # when the oldest is judged; −1 none waits
 
-HELD: Final = 33
+HELD: Final = 34
 """Rows of `HELD_MAX` peaks of a bout that is not certain yet."""
 
 ROW: Final = 5
@@ -66,9 +67,10 @@ QUEUE: Final = HELD + HELD_MAX * ROW
 
 AT: Final = 0
 VALUE: Final = 1
-LEFT: Final = 2  # the score of the samples before it
-JUDGE_AT: Final = 3
-ENTRY: Final = 4
+LOW: Final = 2  # lowest of its half-window before it
+POINTS: Final = 3  # SCORE: of the pairs before it, less two for each fall of the stretch by then
+JUDGE_AT: Final = 4
+ENTRY: Final = 5
 QUEUE_MAX: Final = 20  # tops lie two samples apart and wait for at most LONGEST_WINDOW
 
 LONGEST_WINDOW: Final = 32
@@ -96,37 +98,39 @@ def begin(s: State, index: int, x: float, y: float, z: float) -> None:
     s[SMOOTHED] = s[0] * m + s[1] * m + s[2] * m + s[3] * m + s[4] * m
     s[FIRST] = s[NEXT] = float(index)
     s[RISE_AT] = s[DUE] = -1.0
-    s[COUNT] = 0.0
+    s[COUNT] = s[FALLS] = 0.0
 
 
 def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
     """Eat n samples (g); write the smoothed norm to `out[:n]` and rows after it; return where the rows end."""
     w0, w1, w2, w3, w4 = s[0], s[1], s[2], s[3], s[4]
     m1, m2, m3, m4 = s[M1], s[M2], s[M3], s[M4]
-    last, rise_at, due, k, rows = s[SMOOTHED], s[RISE_AT], s[DUE], s[NEXT], n
-    place = int(k) % RING_SIZE
+    last, rise_at, falls, due, k, rows = s[SMOOTHED], s[RISE_AT], s[FALLS], s[DUE], s[NEXT], n
+    place = RING + int(k) % RING_SIZE
     for i in range(n):
         a, b, c = x[i], y[i], z[i]
         m = sqrt(a * a + b * b + c * c)
         value = w0 * m + w1 * m1 + w2 * m2 + w3 * m3 + w4 * m4
         m1, m2, m3, m4 = m, m1, m2, m3
         out[i] = value
-        s[RING + place] = value
+        s[place] = value
         place += 1
-        if place == RING_SIZE:
-            place = 0
+        if place == STATE:
+            place = RING
         if value > last:
             rise_at = k
-        elif value < last and rise_at >= 0.0:
-            _top(s, rise_at, last, k)
-            rise_at, due = -1.0, s[DUE]
+        elif value < last:
+            if rise_at >= 0.0:
+                _top(s, rise_at, last, k, falls)
+                rise_at, due = -1.0, s[DUE]
+            falls += 1.0
         if k == due:
-            rows = _judge(s, k, value, out, rows)
+            rows = _judge(s, k, value, falls, out, rows)
             due = s[DUE]
         last = value
         k += 1.0
     s[M1], s[M2], s[M3], s[M4] = m1, m2, m3, m4
-    s[SMOOTHED], s[RISE_AT], s[NEXT] = last, rise_at, k
+    s[SMOOTHED], s[RISE_AT], s[FALLS], s[NEXT] = last, rise_at, falls, k
     return rows
 
 
@@ -154,15 +158,18 @@ def likely(s: State) -> list[tuple[float, float]]:
     Those are the held ones of a bout that is not certain yet, and waiting tops that are not too near the last one.
     """
     found: list[tuple[float, float]] = []
-    peaks, credit = s[PEAKS], s[CREDIT] > 0.0
-    if credit and peaks < s[BOUT] and s[NEXT] - s[LAST] <= max(s[WALK + LONGEST], s[RUN + LONGEST]):
+    peaks, last, credit = s[PEAKS], s[LAST], s[CREDIT] > 0.0
+    if credit and 0.0 < peaks < s[BOUT] and s[NEXT] - last <= max(s[WALK + LONGEST], s[RUN + LONGEST]):
         found += [(s[row], s[row + 2] - s[row + 3]) for row in range(HELD, HELD + int(peaks) * ROW, ROW)]
+    if s[COUNT] == 0.0:
+        return found
     for q in range(QUEUE, QUEUE + int(s[COUNT]) * ENTRY, ENTRY):
-        at, gait = s[q + AT], _gait(s, s[q + VALUE])
-        spacing = at - s[LAST]
-        begins = peaks == 0.0 or spacing > s[gait + LONGEST]
-        if credit if begins else spacing >= s[gait + SHORTEST] and (credit or peaks + 1.0 >= s[BOUT]):
-            found.append((at, s[q + VALUE] - _lowest(s, at - s[gait + HALF], int(s[gait + HALF]))))
+        spacing, gait = s[q + AT] - last, _gait(s, s[q + VALUE])
+        if peaks > 0.0 and spacing < s[gait + SHORTEST]:
+            continue
+        in_bout = 1.0 if peaks == 0.0 or spacing > s[gait + LONGEST] else peaks + 1.0
+        if credit or in_bout >= s[BOUT]:
+            found.append((s[q + AT], s[q + VALUE] - s[q + LOW]))
     return found
 
 
@@ -170,70 +177,87 @@ def _gait(s: State, value: float) -> int:
     return WALK if value <= s[SPLIT] else RUN
 
 
-def _top(s: State, at: float, value: float, now: float) -> None:
-    """Let a top wait for the samples after it, if amplitude and the samples before it allow."""
+def _top(s: State, at: float, value: float, now: float, falls: float) -> None:
+    """Let a top wait for the samples after it, if amplitude, spacing and the samples before it allow.
+
+    `falls` is how many pairs of the stretch fell up to it.
+    """
     count = int(s[COUNT])
-    if s[RULE] == GREATEST:
-        while count > 0 and s[QUEUE + (count - 1) * ENTRY + VALUE] < value:
-            count -= 1
-        s[COUNT] = float(count)
-        s[DUE] = s[QUEUE + JUDGE_AT] if count > 0 else -1.0
+    if s[RULE] == GREATEST and count > 0:
+        count = _overtop(s, value, count)
     gait = _gait(s, value)
     half = s[gait + HALF]
     if value < s[gait + LEAST] or value > s[CEILING] or at - s[FIRST] < half:
         return
-    left, need = 0.0, half
+    if s[PEAKS] > 0.0 and at - s[LAST] < s[gait + SHORTEST]:
+        return
+    q = QUEUE + count * ENTRY
+    need = half
     if s[RULE] == SCORE:
-        left = _score(s, at, int(half), -1)
+        _score_before(s, q, at, value, int(half))
+        s[q + POINTS] -= 2.0 * falls
     else:
-        lower = _lower_before(s, at, value)
-        need = max(half, s[WINDOW] - 1.0 - lower)
+        lower = _lower_before(s, q, at, value, half)
         if lower < half:
             return
+        need = max(half, s[WINDOW] - 1.0 - lower)
     if at + need < now:
         return  # a crest flat for longer than the window beside it
-    q = QUEUE + count * ENTRY
-    s[q + AT], s[q + VALUE], s[q + LEFT], s[q + JUDGE_AT] = at, value, left, at + need
+    s[q + AT], s[q + VALUE], s[q + JUDGE_AT] = at, value, at + need
     s[COUNT] = count + 1.0
     s[DUE] = s[QUEUE + JUDGE_AT]
 
 
-def _lower_before(s: State, at: float, value: float) -> float:
-    """Count the samples before `at` that are lower than `value`, up to the first that is not."""
-    most = min(max(s[WINDOW] - 1.0, s[WALK + HALF], s[RUN + HALF]), at - s[FIRST])
-    place, lower = int(at) % RING_SIZE, 0.0
+def _overtop(s: State, value: float, count: int) -> int:
+    """Take the tops lower than `value` from the queue; return how many are left."""
+    while count > 0 and s[QUEUE + (count - 1) * ENTRY + VALUE] < value:
+        count -= 1
+    s[COUNT] = float(count)
+    s[DUE] = s[QUEUE + JUDGE_AT] if count > 0 else -1.0
+    return count
+
+
+def _lower_before(s: State, q: int, at: float, value: float, half: float) -> float:
+    """Count the samples before `at` up to the first not lower than `value`, no more than matter; find their lowest."""
+    most = min(max(half, s[WINDOW] - 1.0 - half), at - s[FIRST])
+    place, lower, lowest = RING + int(at) % RING_SIZE, 0.0, value
     while lower < most:
-        place = place - 1 if place > 0 else RING_SIZE - 1
-        if not s[RING + place] < value:
+        place = place - 1 if place > RING else STATE - 1
+        before = s[place]
+        if not before < value:
             break
+        if before < lowest and lower < half:
+            lowest = before
         lower += 1.0
+    s[q + LOW] = lowest
     return lower
 
 
-def _score(s: State, at: float, half: int, way: int) -> float:
-    """Return the score of the `half` pairs beside `at` on one side: +1 where they fall away from it, else −1."""
-    place, score = int(at) % RING_SIZE, 0.0
+def _score_before(s: State, q: int, at: float, value: float, half: int) -> None:
+    """Score the `half` pairs before `at`, +1 for one that rises, else −1; find their lowest sample."""
+    place, later, lowest, points = RING + int(at) % RING_SIZE, value, value, 0.0
     for _ in range(half):
-        beside = (place + way) % RING_SIZE
-        score += 1.0 if s[RING + beside] < s[RING + place] else -1.0
-        place = beside
-    return score
+        place = place - 1 if place > RING else STATE - 1
+        before = s[place]
+        points += 1.0 if before < later else -1.0
+        if before < lowest:  # noqa: PLR1730  # a call a sample is what a live packet can least afford
+            lowest = before
+        later = before
+    s[q + LOW], s[q + POINTS] = lowest, points
 
 
-def _judge(s: State, now: float, value: float, out: State, rows: int) -> int:
-    """Judge the tops that are due at sample `now`, whose smoothed norm is `value`."""
+def _judge(s: State, now: float, value: float, falls: float, out: State, rows: int) -> int:
+    """Judge the tops that are due at sample `now`: its smoothed norm is `value`, with it `falls` pairs have fallen."""
     count, done = int(s[COUNT]), 0
     while done < count and s[QUEUE + done * ENTRY + JUDGE_AT] <= now:
         q = QUEUE + done * ENTRY
-        at, peak = s[q + AT], s[q + VALUE]
-        gait = _gait(s, peak)
+        gait = _gait(s, s[q + VALUE])
         if s[RULE] == SCORE:
-            passed = s[q + LEFT] + _score(s, at, int(s[gait + HALF]), 1) > s[SCORE_OVER]
+            passed = s[q + POINTS] + 2.0 * falls - s[gait + HALF] > s[SCORE_OVER]
         else:
-            passed = value <= peak  # greater tops have taken it from the queue; one may still be rising
-        valley = _lowest(s, at - s[gait + HALF], 2 * int(s[gait + HALF]))
-        if passed and peak - valley >= s[REST]:
-            rows = _regular(s, gait, at, peak, valley, out, rows)
+            passed = value <= s[q + VALUE]  # greater tops have taken it from the queue; one may still be rising
+        if passed:
+            rows = _regular(s, gait, s[q + AT], s[q + VALUE], _valley(s, q, int(s[gait + HALF])), out, rows)
         done += 1
     for i in range(QUEUE, QUEUE + (count - done) * ENTRY):
         s[i] = s[i + done * ENTRY]
@@ -242,20 +266,22 @@ def _judge(s: State, now: float, value: float, out: State, rows: int) -> int:
     return rows
 
 
-def _lowest(s: State, first: float, samples: int) -> float:
-    """Return the lowest of `samples` + 1 samples from `first` on, all of them there."""
-    place = int(first) % RING_SIZE
-    lowest = s[RING + place]
-    for _ in range(samples):
-        place = place + 1 if place + 1 < RING_SIZE else 0
-        lowest = min(lowest, s[RING + place])
+def _valley(s: State, q: int, half: int) -> float:
+    """Return the lowest of the samples in the window of the top at queue place `q`."""
+    place, lowest = RING + int(s[q + AT]) % RING_SIZE, s[q + LOW]
+    for _ in range(half):
+        place += 1
+        if place == STATE:
+            place = RING
+        if s[place] < lowest:  # noqa: PLR1730  # as above
+            lowest = s[place]
     return lowest
 
 
 def _regular(s: State, gait: int, at: float, peak: float, valley: float, out: State, rows: int) -> int:
     """Drop a peak too near the last, begin a bout with one too far, and write steps once the bout is certain."""
     spacing, known, over_gap = at - s[LAST], s[PEAKS] > 0.0, s[LAST] < s[FIRST]
-    if known and spacing < s[gait + SHORTEST]:
+    if peak - valley < s[REST] or (known and spacing < s[gait + SHORTEST]):
         return rows
     if not known or (spacing >= BRIDGE if over_gap else spacing > s[gait + LONGEST]):
         s[PEAKS] = spacing = 0.0

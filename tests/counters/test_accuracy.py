@@ -52,6 +52,36 @@ LIMITS = {
         "brajdic_walk": 3.6,
         "brajdic_handling": 385,
     },
+    "adaptive_peak": {
+        "eth2023_wrist": 5.1,
+        "eth2022_wrist": 24.3,
+        "banglejs_walk": 46.8,
+        "pebble_wrist": 14.4,
+        "oxford_opt": 13.8,
+        "negatives_hmp": 1074,
+        "negatives_spar_watch": 1876,
+        "negatives_banglejs": 19,
+    },
+    "conventional_peak": {
+        "eth2023_wrist": 13.8,
+        "eth2022_wrist": 45.0,
+        "banglejs_walk": 35.9,
+        "pebble_wrist": 11.1,
+        "oxford_opt": 20.9,
+        "negatives_hmp": 1065,
+        "negatives_spar_watch": 2385,
+        "negatives_banglejs": 14,
+    },
+    "plus_minus": {
+        "eth2023_wrist": 12.2,
+        "eth2022_wrist": 20.1,
+        "banglejs_walk": 14.5,
+        "pebble_wrist": 4.7,
+        "oxford_opt": 2.9,
+        "negatives_hmp": 958,
+        "negatives_spar_watch": 2725,
+        "negatives_banglejs": 9,
+    },
 }
 """Mean absolute percentage error over the recordings that hold steps, or false steps an hour where a set holds none."""
 
@@ -60,6 +90,9 @@ DOCUMENTED = {
     "autocorrelation": {"eth2023_wrist": 21.4, "eth2022_wrist": 31.9, "banglejs_walk": 23.1, "pebble_wrist": 13.2},
     "gyro_zero_crossing": {"eth2023_wrist": 69.8, "eth2022_wrist": 23.2, "dcaiti": 46.8, "brajdic_walk": 22.8},
     "fusion": {"eth2023_wrist": 54.4, "eth2022_wrist": 46.3, "dcaiti": 11.8, "brajdic_walk": 22.4},
+    "adaptive_peak": {"eth2023_wrist": 5.1, "eth2022_wrist": 25.8, "banglejs_walk": 52.8, "pebble_wrist": 15.4},
+    "conventional_peak": {"eth2023_wrist": 15.3, "eth2022_wrist": 49.8, "banglejs_walk": 44.4, "pebble_wrist": 12.0},
+    "plus_minus": {"eth2023_wrist": 74.8, "eth2022_wrist": 23.0, "banglejs_walk": 6.0, "pebble_wrist": 8.1},
 }
 """What `paper` gives, as the counter's module says."""
 

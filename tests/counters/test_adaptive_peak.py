@@ -82,7 +82,8 @@ def test_idle_below_walking_height_and_no_ceiling_above_running(height, counted)
         (1.5, 15, True),
         (1.5, 40, True),
         (1.5, 41, False),
-        (2.5, 13, True),
+        (2.0, 14, False),
+        (2.5, 14, True),
         (2.5, 25, True),
         (2.5, 26, False),
     ],
@@ -143,6 +144,12 @@ def test_a_peak_too_near_changes_nothing():
     assert steps_at(params, spikes(120, {30: 1.5, 42: 1.5, 55: 1.5})) == [55]
 
 
+@pytest.mark.parametrize("distance", [8, 10])
+def test_of_equal_peaks_the_first_counts(distance):
+    x = spikes(120, {50: 1.5, 50 + distance: 1.5})
+    assert steps_at(replace(EVERY_PEAK, walk_shortest_s=0.1), x) == [50]
+
+
 def test_a_flat_crest_counts_at_its_first_sample_unless_it_is_longer_than_its_window():
     def crest(length):
         x = spikes(120, {30: 1.5})
@@ -165,6 +172,15 @@ def test_a_step_carries_what_decided_it():
     assert (walking.peak, walking.valley, walking.upper, walking.lower) == (1.7, 0.4, 1.2, None)
     assert (running.peak, running.valley, running.upper) == (2.5, 0.3, 2.0)
     assert walking.strength == pytest.approx(1.3)
+
+
+@pytest.mark.parametrize(("height", "half"), [(1.5, 10), (2.5, 5)])
+def test_the_valley_is_the_lowest_of_the_neighbourhood(height, half):
+    for dip, inside in ((-half - 1, False), (-half, True), (half, True), (half + 1, False)):
+        x = spikes(120, {50: height})
+        x[50 + dip] = 0.2
+        (step,) = collect(build(EVERY_PEAK), [block_of(x)], finish=True).steps
+        assert (step.valley == 0.2) is inside
 
 
 @pytest.mark.parametrize("smoothing", [1, 2, 3, 4, 5])
@@ -192,7 +208,14 @@ def test_an_uncertain_bout_ends_with_a_gap():
     counter = build(TUNED)
     signal = Signal(walk(600, 2.0, 0.5))
     assert counter.update(signal.block(0, 90)).pending == 3
-    assert collect(counter, [signal.block(0, 90, offset=130)], finish=True).steps == []
+    assert collect(counter, [signal.block(0, 120, offset=130)], finish=True).steps == []
+
+
+def test_a_bout_ends_with_the_stream():
+    counter = build(TUNED)
+    signal = Signal(walk(600, 2.0, 0.5))
+    assert collect(counter, [signal.block()], finish=True).steps
+    assert collect(counter, [signal.block(0, 90, offset=600)], finish=True).steps == []
 
 
 def test_a_peak_is_called_likely_once_it_falls_and_taken_back_when_another_tops_it():
@@ -200,12 +223,21 @@ def test_a_peak_is_called_likely_once_it_falls_and_taken_back_when_another_tops_
     x = spikes(120, {30: 1.5, 55: 1.5, 61: 1.6})
     updates = [counter.update(block_of(x[k : k + 1], start=k)) for k in range(len(x))]
     told = {k: [round(at_s * GRID_HZ) for at_s, _ in update.likely] for k, update in enumerate(updates)}
-    assert told[55] == []
+    assert told[31] == told[39] == told[55] == []  # the first of a bout is but a reference
     assert told[56] == [55]
     assert told[62] == [61]
     assert told[71] == []
     assert [round(step.at_s * GRID_HZ) for step in updates[71].steps] == [61]
     assert [update.pending for update in updates] == [len(names) for names in told.values()]
+
+
+def test_a_peak_too_near_one_just_counted_is_likely_no_more():
+    counter = build(EVERY_PEAK)
+    x = spikes(120, {20: 2.6, 32: 2.5, 38: 2.4})  # the second waits for eight samples, the third for fourteen
+    likely = [counter.update(block_of(x[k : k + 1], start=k)).likely for k in range(len(x))]
+    told = [[round(at_s * GRID_HZ) for at_s, _ in names] for names in likely]
+    assert told[39] == [32, 38]
+    assert told[40] == []
 
 
 def test_held_peaks_are_likely_until_their_bout_is_certain_or_over():
