@@ -24,6 +24,7 @@ from service.wearables.bracelet import (
     encode,
     encode_boot,
     encode_clock,
+    encode_device_id,
     encode_rate,
     encode_scale,
     samples_per_packet,
@@ -75,8 +76,7 @@ class Bracelet:
         packet_samples: int = PACKET_SAMPLES,
         battery_percent: int = 100,
     ) -> None:
-        if not 1 <= len(device_id.encode()) <= 20:
-            raise ParameterError("device_id", device_id, "1 to 20 bytes of UTF-8")
+        encode_device_id(device_id)  # raises here rather than at the first read
         if not 1 <= lsb_per_g <= 0xFFFF:
             raise ParameterError("lsb_per_g", lsb_per_g, "1 to 65535 LSB per g")
         if packet_samples < 0:
@@ -169,7 +169,7 @@ class Bracelet:
 
     def device_id_value(self) -> bytes:
         """Return the device id in UTF-8."""
-        return self.device_id.encode()
+        return encode_device_id(self.device_id)
 
     def clock_value(self) -> bytes:
         """Return index and full tick of the newest sample at which a tick was taken."""

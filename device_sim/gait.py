@@ -84,6 +84,8 @@ class Walker:
         for name, value in (("strength", strength), ("arm_m", arm_m), ("noise_g", noise_g)):
             if not 0 <= value < math.inf:
                 raise ParameterError(name, value, "0 or more is wanted")
+        if seed < 0:
+            raise ParameterError("seed", seed, "0 or more is wanted")
         self._rate_hz = rate_hz
         self._loop = loop
         self._seed = seed

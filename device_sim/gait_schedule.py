@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from typing import Final
@@ -13,6 +12,8 @@ from service.errors import ParameterError
 ACTIVITIES: Final = (*GAITS, *MOTIONS)
 CADENCE_SPM: Final = (20.0, 240.0)
 """Steps a minute that a schedule may ask for."""
+LONGEST_S: Final = 86_400.0
+"""A segment is laid out as a whole: a day of it takes 50 MB."""
 _UNITS_S: Final = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 _PART: Final = re.compile(
     r"(?P<activity>[a-z_]+):(?P<number>\d+(?:\.\d+)?)(?P<unit>s|min|h|)(?:@(?P<cadence>\d+(?:\.\d+)?))?"
@@ -30,8 +31,8 @@ class Segment:
     def __post_init__(self) -> None:
         if self.activity not in ACTIVITIES:
             raise ParameterError("activity", self.activity, f"known are {', '.join(ACTIVITIES)}")
-        if not 0 < self.duration_s < math.inf:
-            raise ParameterError("duration_s", self.duration_s, "a time above 0 seconds is wanted")
+        if not 0 < self.duration_s <= LONGEST_S:
+            raise ParameterError("duration_s", self.duration_s, "above 0 s and at most 24 h; a schedule may be looped")
         if self.cadence_spm is None:
             return
         if self.activity not in GAITS:

@@ -119,6 +119,18 @@ class GattBracelet:
         links = self._links_before + (self._peripheral.links_made if self._peripheral else 0)
         return GattStatistics(packets=self._packets, links=links, **asdict(self.bracelet.statistics()))
 
+    async def until_played(self) -> None:
+        """Wait until a finite source has been played; raise what ended the bracelet before that."""
+        if self._task is None:
+            raise RuntimeError("the bracelet is not on the air")
+        played = asyncio.ensure_future(self.played.wait())
+        try:
+            await asyncio.wait({self._task, played}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            played.cancel()
+        if not self.played.is_set() and not self._task.cancelled() and (error := self._task.exception()) is not None:
+            raise _first(error)
+
     async def set_battery(self, percent: int) -> None:
         """Set the charge (0…100 %) and notify it."""
         self.bracelet.battery_percent = percent

@@ -37,6 +37,8 @@ NOTHING_COUNTED = 1
 USAGE_ERROR = 2
 NO_BLUETOOTH = 3
 DEFAULT_AIR = "127.0.0.1:7400"
+BOOT_NS = 50_000_000
+"""A simulated bracelet that starts again later than this has another boot number."""
 DEMO_WALK = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
 
 Command = Callable[[argparse.Namespace], Coroutine[Any, Any, int | None]]
@@ -46,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     options = _parser().parse_args(argv)
     logging.basicConfig(level=logging.WARNING, format="steplink: %(message)s")
+    logging.getLogger("bumble").setLevel(logging.CRITICAL)  # what a lost link leaves behind is no news to a user
     try:
         return asyncio.run(_stoppable(options.command(options))) or 0
     except (KeyboardInterrupt, asyncio.CancelledError):
@@ -74,9 +77,32 @@ async def _demo(options: argparse.Namespace) -> None:
 
     settings = _settings(options)
     bracelet = _bracelet(options)
-    async with LocalAir() as air, _on_air(air, bracelet, options), air.central() as central:
+    async with LocalAir() as air, _on_air(air, bracelet, options) as worn, air.central() as central:
         backend = Backend(scanner=central.scanner, client=central.client)
-        await _serve_with(settings, _supervisor(settings, backend, wanted=None))
+        await _side_by_side(
+            _serve_with(settings, _supervisor(settings, backend, wanted=None)),
+            _take_off(worn),
+        )
+
+
+async def _side_by_side(*works: Coroutine[Any, Any, None]) -> None:
+    """Run all until they have ended; the first failure ends the others and is raised."""
+    tasks = [asyncio.create_task(work) for work in works]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)
+        for task in done:
+            task.result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _take_off(worn: GattBracelet) -> None:
+    """Take a bracelet that has nothing more to play off the air."""
+    await worn.until_played()
+    print("the recording has been played; the bracelet leaves", flush=True)
+    await worn.go_away()
 
 
 async def _serve(options: argparse.Namespace) -> None:
@@ -109,7 +135,7 @@ async def _sim(options: argparse.Namespace) -> None:
     async with hosted_air(options.air) as air, _on_air(air, bracelet, options) as played:
         print(f"bracelet {bracelet.device_id} is on the air at {options.air}; in another terminal:", flush=True)
         print(f"    steplink serve --air {options.air}", flush=True)
-        await played.played.wait()
+        await played.until_played()
         print("the recording has been played")
 
 
@@ -238,7 +264,7 @@ async def _backend(air: str | None) -> Any:  # noqa: ANN401
 def _on_air(air: Any, bracelet: Any, options: argparse.Namespace) -> GattBracelet:  # noqa: ANN401
     from device_sim.gatt import Start  # noqa: PLC0415
 
-    start = Start.ON_SUBSCRIBE if options.recording else Start.POWER_ON
+    start = Start.ON_SUBSCRIBE if options.recording or options.once else Start.POWER_ON
     device: GattBracelet = air.bracelet(bracelet, name=options.name, speed=options.speed, start=start)
     return device
 
@@ -250,7 +276,10 @@ def _bracelet(options: argparse.Namespace) -> Any:  # noqa: ANN401
 
     # Boots count upwards for ever; a simulated bracelet keeps no flash memory, so the clock counts for it.
     return Bracelet(
-        _source(options), device_id=options.id, boot=int(time.time()), packet_samples=options.packet_samples
+        _source(options),
+        device_id=options.id,
+        boot=time.time_ns() // BOOT_NS & 0xFFFFFFFF,
+        packet_samples=options.packet_samples,
     )
 
 
@@ -312,7 +341,7 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
     """Add an option for each of the service's settings."""
     for field in dataclasses.fields(Settings):
         meta = field.metadata
-        span = f", {meta['low']}–{meta['high']} {meta['unit']}" if meta["low"] is not None else ""
+        span = f", {meta['low']}–{meta['high']} {meta['unit']}".rstrip() if meta["low"] is not None else ""
         repeated = isinstance(field.default, tuple)
         parser.add_argument(
             f"--{field.name.replace('_', '-')}",

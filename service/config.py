@@ -18,7 +18,7 @@ class Settings:
     """The service's options; ParameterError where one is out of range."""
 
     host: str = option("127.0.0.1", "address to listen on; only this machine's own addresses are allowed for now")
-    port: int = option(8600, "TCP port to listen on; 0 picks a free one", unit="port", low=0, high=65535)
+    port: int = option(8600, "TCP port to listen on; 0 picks a free one", low=0, high=65535)
     counter: str = option("double_threshold", "counter whose count is a device's steps")
     preset: str = option("tuned", "its parameters: paper (as published) or tuned")
     beside: tuple[str, ...] = option((), "another counter to run on the same stream; may be repeated", unit="name")
@@ -32,7 +32,7 @@ class Settings:
         for name, spec in self.__dataclass_fields__.items():
             low, high, value = spec.metadata["low"], spec.metadata["high"], getattr(self, name)
             if low is not None and not low <= value <= high:
-                raise ParameterError(name, value, f"from {low} to {high} {spec.metadata['unit']}")
+                raise ParameterError(name, value, f"from {low} to {high} {spec.metadata['unit']}".rstrip())
         if self.host not in LOOPBACK:
             raise ParameterError("host", self.host, f"one of {', '.join(LOOPBACK)}: the API has no access control yet")
 

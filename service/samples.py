@@ -38,6 +38,8 @@ class RawBlock:
     boot: int
     index: int
     tick: int | None
+    history: bool = False
+    """Sent again because a host asked for it."""
     acc_g: Columns
     gyro_rad_s: Columns | None = None
     mag_ut: Columns | None = None

@@ -130,6 +130,14 @@ def test_playing_a_recording_once_ends_by_itself(tmp_path):
     assert "has been played" in out
 
 
+def test_a_demo_that_has_played_its_recording_shows_the_bracelet_gone():
+    port = free_port()
+    with running("demo", "--port", port, "--walk", "normal:8", "--once", "--speed", 4) as demo:
+        wait_for(lambda: (found := first_device(port)) and found["state"] == "lost" and found["steps"] > 5)
+        assert first_device(port)["cadence_spm"] is None
+        assert "has been played" in ends_cleanly(demo, signal.SIGINT)
+
+
 def test_without_bluetooth_scan_says_what_to_do():
     answer = run("scan", "--seconds", 1)
     assert answer.returncode == 3
@@ -194,6 +202,9 @@ def test_a_port_in_use_is_one_line():
         (["demo", "--walk", "fly:10"], "fly"),
         (["demo", "--name", "far too long"], "8"),
         (["demo", "--id", ""], "1 to 20"),
+        (["demo", "--id", "a/b"], "without /"),
+        (["demo", "--seed", "-5"], "0 or more"),
+        (["demo", "--walk", "normal:99999h"], "24 h"),
         (["demo", "--speed", "0"], "0.01"),
         (["demo", "--packet-samples", "-1"], "packet"),
         (["sim", "--air", "nowhere"], "nowhere"),

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import FastAPI, Query, Request, WebSocket
+from fastapi.exceptions import RequestValidationError
 from fastapi.middleware import Middleware
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
@@ -45,9 +46,14 @@ def create_app(supervisor: Supervisor) -> FastAPI:
         lifespan=lifespan,
         redoc_url=None,
         docs_url=None,
+        responses={
+            403: {"model": models.Problem, "description": "A foreign Host or Origin"},
+            422: {"model": models.Problem, "description": "A parameter is missing, of the wrong type or out of range"},
+        },
         middleware=[Middleware(Guard, hosts=frozenset(LOOPBACK))],
     )
     app.add_exception_handler(UnknownDeviceError, _not_found)
+    app.add_exception_handler(RequestValidationError, _invalid)
     for fault in (ParameterError, CounterError):
         app.add_exception_handler(fault, _unprocessable)
     add_device_routes(app, supervisor)
@@ -59,6 +65,13 @@ def create_app(supervisor: Supervisor) -> FastAPI:
 
 async def _not_found(_request: Request, error: Exception) -> JSONResponse:
     return JSONResponse({"detail": str(error)}, status_code=404)
+
+
+async def _invalid(_request: Request, error: Exception) -> JSONResponse:
+    """Say what FastAPI found wrong as the sentence that every other refusal is."""
+    found = error.errors() if isinstance(error, RequestValidationError) else []
+    detail = "; ".join(f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}" for fault in found)
+    return JSONResponse({"detail": detail}, status_code=422)
 
 
 async def _unprocessable(_request: Request, error: Exception) -> JSONResponse:

@@ -35,7 +35,7 @@ class Guard:
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
-        fault = self._fault(Headers(scope=scope))
+        fault = self._fault(Headers(scope=scope), "https" if scope["scheme"] in {"https", "wss"} else "http")
         if fault is None:
             await self._app(scope, receive, _with_headers(send) if scope["type"] == "http" else send)
         elif scope["type"] == "http":
@@ -43,12 +43,12 @@ class Guard:
         else:  # a close before accepting is answered with 403
             await send({"type": "websocket.close", "code": 4403, "reason": fault})
 
-    def _fault(self, headers: Headers) -> str | None:
+    def _fault(self, headers: Headers, scheme: str) -> str | None:
         host = headers.get("host", "")
         if _name(f"//{host}") not in self._hosts:
             return f"host {host!r} is not this service; use one of {', '.join(sorted(self._hosts))}"
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and origin != f"{scheme}://{host}":
             return f"origin {origin!r} may not use this service"
         return None
 

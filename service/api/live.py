@@ -86,5 +86,5 @@ async def _send_text(socket: WebSocket, text: str) -> None:
 async def _receive(socket: WebSocket) -> None:
     """Read and drop what the client says, until it goes: the feed takes no requests."""
     with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-        while True:
-            await socket.receive_text()
+        while (await socket.receive())["type"] != "websocket.disconnect":
+            pass

@@ -40,7 +40,7 @@ def list_page(device: Device, query: StepsQuery) -> models.Page[models.StepEvent
     for name, moment in (("from", query.from_), ("to", query.to)):
         if moment is not None and moment.tzinfo is None:
             raise ParameterError(name, moment.isoformat(), "a time with an offset, as 2026-01-02T03:04:05Z")
-    last = _ordinal(query.after, {device.id, device.address}) if query.after else 0
+    last = _ordinal(query.after, device) if query.after else 0
     if query.counter is not None and query.counter not in device.session.tracker.steps:
         known = ", ".join(device.session.tracker.steps)
         raise ParameterError("counter", query.counter, f"this device has {known}")
@@ -57,8 +57,8 @@ def list_page(device: Device, query: StepsQuery) -> models.Page[models.StepEvent
     return models.Page(items=items, next=f"{device.id}:{items[-1].ordinal}" if more else None)
 
 
-def _ordinal(cursor: str, keys: set[str]) -> int:
-    device, _, ordinal = cursor.rpartition(":")
-    if device not in keys:
-        raise ParameterError("after", cursor, f"a cursor of this device, as {min(keys)}:42")
+def _ordinal(cursor: str, device: Device) -> int:
+    key, _, ordinal = cursor.rpartition(":")
+    if key not in {device.id, device.address}:
+        raise ParameterError("after", cursor, f"a cursor of this device, as {device.id}:42")
     return int(ordinal)

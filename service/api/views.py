@@ -9,6 +9,7 @@ from typing import Any
 from service.api import models
 from service.counters.registry import CounterKind
 from service.pipeline.device import Device
+from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged, Notice, StateChanged
 from service.pipeline.supervisor import Supervisor
@@ -41,7 +42,7 @@ def device_view(device: Device) -> models.Device:
         steps_now=tracker.steps_now,
         counters=tracker.steps,
         counter_faults=tracker.counter_faults,
-        cadence_spm=tracker.cadence_spm,
+        cadence_spm=tracker.cadence_spm if device.state is State.STREAMING else None,
         battery_percent=info.battery_percent,
         rate_hz=info.rate_hz,
         measured_rate_hz=tracker.measured_rate_hz,

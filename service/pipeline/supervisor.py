@@ -70,10 +70,9 @@ class Supervisor:
         raise UnknownDeviceError(key)
 
     def connect(self, key: str) -> Device:
-        """Want a device connected; it happens as soon as it is heard."""
+        """Want a device connected; it happens as soon as it is heard, without waiting for a back-off."""
         device = self.device(key)
-        if not device.wanted:
-            device.want()
+        device.want()
         return device
 
     def disconnect(self, key: str) -> Device:
@@ -98,14 +97,15 @@ class Supervisor:
     async def _run(self, tasks: asyncio.TaskGroup) -> None:
         while True:
             try:
-                due = await self._hear_one_due()
+                await self._connect(*await self._hear_one_due(), tasks)
             except LinkError as error:
                 if self.trouble is None or self.trouble.why != error.why:
                     logger.warning("nothing can be heard for now, trying again: %s", error.why)
                 self.trouble = error
                 await asyncio.sleep(SCANNER_RETRY_S)
-                continue
-            await self._connect(*due, tasks)
+            except Exception:  # a fault of ours in one round must not end them all
+                logger.exception("the supervisor goes on after an internal error")
+                await asyncio.sleep(SCANNER_RETRY_S)
 
     async def _hear_one_due(self) -> tuple[Device, Sighting]:
         """Scan until a device is heard that should be connected now."""
@@ -138,6 +138,8 @@ class Supervisor:
         """Start the device's link task and wait until it is connected or has failed."""
         if device.task is not None and not device.task.done():
             await asyncio.wait({device.task})
+        if not device.is_due:  # while the scanner stopped or the old link closed, the device was disconnected
+            return
         settled = asyncio.Event()
         device.move(Cause.ATTEMPT)
         link = BleLink(sighting.handle, device.wearable.handshake(), self._backend)

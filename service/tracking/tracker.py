@@ -15,6 +15,7 @@ from typing import Any
 from service.counters.contract import StepCounter
 from service.errors import CounterError, WireError, WireFault
 from service.samples import (
+    GRID_HZ,
     TICK_EVERY,
     Columns,
     Counting,
@@ -31,14 +32,9 @@ from service.samples import (
 )
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
+from service.tracking.doubt import Doubt, index_ahead
 from service.tracking.tentative import TentativeSteps
 from service.wearables.contract import Wearable
-
-_INDEX_SPAN = 1 << 32
-"""Sample indices are u32 on the wire."""
-
-_BELIEVED_JUMP = 1 << 18
-"""Samples (87 min at 50 Hz) an index may jump ahead on one packet's word: corrupt bytes must not end a count."""
 
 CounterFactory = Callable[[], StepCounter]
 
@@ -81,8 +77,7 @@ class Tracker:
         self._timebase: Timebase | None = None
         self._boot: int | None = None
         self._next_index = 0
-        self._held: RawBlock | None = None
-        """A packet that claims a reboot or a long jump, until the next one bears it out."""
+        self._doubt = Doubt()
         self._said: dict[str, bytes] = {}
         """Last value of each characteristic that describes the device: the codec's state, for a snapshot."""
 
@@ -165,7 +160,7 @@ class Tracker:
             "boot": self._boot,
             "next_index": self._next_index,
             "counter_faults": dict(self.counter_faults),
-            "held": dataclasses.asdict(self._held) if self._held else None,
+            "doubt": self._doubt.snapshot(),
             "timebase": self._timebase.snapshot() if self._timebase else None,
             "counters": {name: counter.snapshot() for name, counter in self._counters.items()},
         }
@@ -186,7 +181,7 @@ class Tracker:
         self._tentative.restore(state["tentative"])
         self._boot, self._next_index = state["boot"], state["next_index"]
         self.counter_faults = dict(state["counter_faults"])
-        self._held = RawBlock(**state["held"]) if state["held"] else None
+        self._doubt.restore(state["doubt"])
         self._timebase = Timebase.restored(state["timebase"]) if state["timebase"] else None
 
     def _describe(self, said: DeviceInfo) -> list[Event]:
@@ -200,25 +195,15 @@ class Tracker:
         return [Described(info=info)]
 
     def _receive(self, block: RawBlock) -> list[Event]:
-        """Count a block on; one that claims a reboot or a long jump only when the next one bears it out."""
-        held, self._held = self._held, None
-        if not self._surprising(block):
-            self.tally.packets_bad += held is not None
-            return self._count(block)
-        if held is None or held.boot != block.boot or not 0 <= block.index - held.index <= _BELIEVED_JUMP:
-            self.tally.packets_bad += held is not None
-            self._held = block
-            return []
-        return [*self._count(held), *self._count(block)]
-
-    def _surprising(self, block: RawBlock) -> bool:
-        if self._boot is None or block.boot not in {self._boot, self.info.boot}:
-            return self._boot is not None
-        return block.boot == self._boot and self._ahead(block) > _BELIEVED_JUMP
-
-    def _ahead(self, block: RawBlock) -> int:
-        """Return how many samples the block lies ahead of the next one awaited; negative for older ones."""
-        return (block.index - self._next_index + _INDEX_SPAN // 2) % _INDEX_SPAN - _INDEX_SPAN // 2
+        """Count what can be believed of a block and of the one held before it."""
+        if self.info.rate_hz is None:
+            raise WireError(WireFault.ORDER, "samples before the rate was read")
+        awaited = self._next_index if self._timebase and block.boot == self._boot else None
+        boots = {boot for boot in (self._boot, self.info.boot) if boot is not None}
+        verdict = self._doubt.judge(block, boots=boots, awaited=awaited, rate_hz=self.info.rate_hz)
+        self.tally.packets_bad += verdict.refused
+        events = self._begin_boot(block.boot) if verdict.restarted else []
+        return [*events, *(event for believed in verdict.blocks for event in self._count(believed))]
 
     def _count(self, block: RawBlock) -> list[Event]:
         """Place a block on the grid and run the counters over it."""
@@ -252,29 +237,33 @@ class Tracker:
         return events
 
     def _follow_boot(self, boot: int) -> list[Event]:
-        """At a new boot number: end what was counted, begin device time anew; the counts go on."""
         if self._boot == boot:
             return []
-        previous, self._boot = self._boot, boot
-        if previous is None:
+        if self._boot is None:
+            self._boot = boot
             return []
+        return self._begin_boot(boot)
+
+    def _begin_boot(self, boot: int) -> list[Event]:
+        """End what was counted, begin device time anew; the counts go on."""
+        previous = boot if self._boot is None else self._boot
         self.tally.reboots += 1
         events = self._finish_counters()
-        events += self._tentative.follow(
-            previous, (), [event.step for event in events if isinstance(event, StepCounted)]
-        )
+        confirmed = [event.step for event in events if isinstance(event, StepCounted)]
+        events += self._tentative.follow(previous, (), confirmed)
         self._counters = {name: make() for name, make in self._factories.items()}
         self._cadence = Cadence()
         self._timebase, self._next_index = None, 0
-        if self.info.boot != boot:
+        if self.info.boot != boot or previous == boot:
             self.info = dataclasses.replace(self.info, boot=boot, clock=None)
+        self._boot = boot
         return [*events, Rebooted(boot=boot, previous=previous)]
 
     def _unseen(self, block: RawBlock) -> RawBlock | None:
         """Unwrap the block's index and cut off the samples seen before; None if it holds no others."""
         index = block.index
         if self._timebase is not None:
-            index = self._next_index + self._ahead(block)
+            index = self._next_index + index_ahead(block.index, self._next_index)
         seen = max(0, self._next_index - index) if self._timebase else 0
         if seen == 0:
             return dataclasses.replace(block, index=index)
@@ -293,9 +282,7 @@ class Tracker:
 
     def _ready_timebase(self) -> Timebase:
         if self._timebase is None:
-            if self.info.rate_hz is None:
-                raise WireError(WireFault.ORDER, "samples before the rate was read")
-            self._timebase = Timebase(self.info.rate_hz)
+            self._timebase = Timebase(self.info.rate_hz or GRID_HZ)
             if self.info.clock is not None:
                 self._timebase.set_clock(*self.info.clock)
         return self._timebase

@@ -31,7 +31,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from service.errors import WireError, WireFault
+from service.errors import ParameterError, WireError, WireFault
 from service.samples import TICK_EVERY, DeviceInfo, RawBlock
 from service.wearables.contract import Action, Read, Subscribe, Write
 
@@ -59,11 +59,14 @@ FIRMWARE_REVISION: Final = _sig(0x2A26)
 VERSION: Final = 1
 FLAG_HISTORY: Final = 0x10
 _FLAGS_RESERVED: Final = 0xE0
+ID_RULE: Final = "1 to 20 bytes of printable UTF-8 without /"
 ATT_HEADER: Final = 3
 """Bytes of a notification that are not value: op code and handle."""
 _HEADER: Final = struct.Struct("<BBIH")
 _SAMPLE_BYTES: Final = 6
 _I16_MIN, _I16_MAX = -32768, 32767
+LONGEST_UPTIME_TICKS: Final = 1 << 42
+"""136 years: no device runs longer, and device time stays exact to far below a sample."""
 DEFAULT_LSB_PER_G: Final = 4096
 """±8 g in 16 bits: running on the wrist passes ±4 g."""
 
@@ -110,6 +113,14 @@ def encode_rate(rate_hz: float) -> bytes:
 def encode_boot(boot: int) -> bytes:
     """Return the boot characteristic's value."""
     return struct.pack("<I", boot & 0xFFFFFFFF)
+
+
+def encode_device_id(device: str) -> bytes:
+    """Return the device id characteristic's value; ParameterError where the id breaks its rule."""
+    data = device.encode()
+    if not _valid_id(device, data):
+        raise ParameterError("device_id", device, ID_RULE)
+    return data
 
 
 def encode_clock(index: int, tick: int) -> bytes:
@@ -171,7 +182,13 @@ class Bracelet:
         values = struct.unpack_from(f"<{3 * n}h", data, _HEADER.size)
         scale = self._lsb_per_g
         x, y, z = ([value / scale for value in values[axis::3]] for axis in range(3))
-        return RawBlock(boot=self._full_boot(boot_low), index=index, tick=tick, acc_g=(x, y, z))
+        return RawBlock(
+            boot=self._full_boot(boot_low),
+            index=index,
+            tick=tick,
+            history=bool(flags & FLAG_HISTORY),
+            acc_g=(x, y, z),
+        )
 
     def _full_boot(self, low: int) -> int:
         """Return the first boot number from the one read on whose low byte is `low`: boots count upwards."""
@@ -201,6 +218,8 @@ def _clock(data: bytes) -> DeviceInfo:
     index, tick = _fixed("<IQ", data, CLOCK)
     if index % TICK_EVERY:
         raise WireError(WireFault.VALUE, f"a clock at sample {index}, no multiple of {TICK_EVERY}")
+    if tick >= LONGEST_UPTIME_TICKS:
+        raise WireError(WireFault.VALUE, f"a clock of {tick} ticks, more than a hundred years after boot")
     return DeviceInfo(clock=(index, tick))
 
 
@@ -213,11 +232,13 @@ def _battery(data: bytes) -> DeviceInfo:
 
 def _device_id(data: bytes) -> DeviceInfo:
     text = _text(data, DEVICE_ID)
-    if not 1 <= len(data) <= 20 or not text.isprintable() or "/" in text:
-        raise WireError(
-            WireFault.VALUE, f"a device id of {len(data)} bytes; 1 to 20 printable ones without / are valid"
-        )
+    if not _valid_id(text, data):
+        raise WireError(WireFault.VALUE, f"a device id of {len(data)} bytes; {ID_RULE} are valid")
     return DeviceInfo(device=text)
+
+
+def _valid_id(text: str, data: bytes) -> bool:
+    return 1 <= len(data) <= 20 and text.isprintable() and "/" not in text
 
 
 def _text(data: bytes, characteristic: str) -> str:

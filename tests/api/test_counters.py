@@ -27,7 +27,9 @@ async def test_every_counter_tells_its_parameters_with_unit_range_and_presets(wa
     rest = {parameter["name"]: parameter for parameter in double["parameters"]}["rest_raw"]
     assert (rest["unit"], rest["low"], rest["high"]) == ("raw units", 0, 64)
     assert rest["presets"] == {"paper": 1.0, "tuned": 5.75}
-    assert all(p["text"] and (p["options"] or p["unit"]) for item in items for p in item["parameters"])
+    for parameter in (parameter for item in items for parameter in item["parameters"]):
+        assert parameter["text"]
+        assert parameter["options"] or (parameter["unit"] is not None and parameter["low"] < parameter["high"])
 
 
 async def test_other_parameters_begin_a_segment_and_the_count_never_falls(walk):

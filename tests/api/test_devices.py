@@ -1,5 +1,7 @@
 """REST over the whole service: devices, steps page by page, and what is refused."""
 
+import asyncio
+import contextlib
 import math
 from datetime import datetime, timedelta
 
@@ -10,6 +12,7 @@ from stage import staged
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from device_sim.gatt import Start
+from service.pipeline import supervisor
 
 
 def walking(seconds=30, **how):
@@ -108,6 +111,42 @@ async def test_disconnect_leaves_alone_and_connect_brings_back():
         assert (await stage.http.post("api/v1/devices/sim-1/connect")).status_code == 202
         back = await stage.until(lambda now: now["state"] == "streaming" and now["samples"] > device["samples"])
         assert back["steps"] >= device["steps"]
+
+
+async def test_a_disconnect_at_the_worst_moment_leaves_the_supervisor_alive(monkeypatch):
+    """Between the advertisement that starts an attempt and the attempt itself the scanner takes its time to stop."""
+    stopping, go_on = asyncio.Event(), asyncio.Event()
+    scanning = supervisor.scanning
+
+    @contextlib.asynccontextmanager
+    async def slow_to_stop(*words):
+        async with scanning(*words) as sightings:
+            yield sightings
+            stopping.set()
+            await go_on.wait()
+
+    monkeypatch.setattr(supervisor, "scanning", slow_to_stop)
+    async with staged(walking(600)) as stage:
+        await stopping.wait()
+        device = stage.supervisor.devices[0]
+        assert (await stage.http.post(f"api/v1/devices/{device.address}/disconnect")).status_code == 202
+        go_on.set()
+        await asyncio.sleep(0.3)
+        assert device.state == "disconnected"
+        await stage.http.post(f"api/v1/devices/{device.address}/connect")
+        await stage.until(lambda now: now["state"] == "streaming")
+
+
+async def test_every_refusal_is_a_sentence_as_the_schema_says(played):
+    openapi = (await played.http.get("openapi.json")).json()
+    for path in openapi["paths"].values():
+        for operation in path.values():
+            schema = operation["responses"]["422"]["content"]["application/json"]["schema"]
+            assert schema == {"$ref": "#/components/schemas/Problem"}
+    for query in ("limit=0", "from=2026-01-02T03:04:05", "unknown=1"):
+        detail = (await played.http.get(f"api/v1/devices/sim-1/steps?{query}")).json()["detail"]
+        assert isinstance(detail, str)
+        assert query.partition("=")[0] in detail
 
 
 async def test_only_wanted_devices_are_connected():

@@ -96,6 +96,7 @@ async def test_subscribing_by_device(walk):
 async def test_what_a_client_says_is_ignored_and_a_client_that_goes_is_forgotten(walk):
     async with walk.live() as feed:
         await feed.send("anything")
+        await feed.send(b"\x00anything")
         await messages(feed, 20)
     async with asyncio.timeout(5):
         while walk.supervisor.hub.statistics()["subscribers"]:  # noqa: ASYNC110  # the hub tells nobody of it
@@ -127,8 +128,9 @@ async def _fill(stage):
     await asyncio.sleep(0.01)
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1"])
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https"])
 async def test_a_foreign_origin_is_refused(walk, origin):
+    origin = walk.url.rstrip("/").replace("http", "https") if origin == "https" else origin
     with pytest.raises(websockets.InvalidStatus) as refused:
         async with walk.live(additional_headers={"Origin": origin}):
             pass

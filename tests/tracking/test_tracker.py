@@ -129,6 +129,64 @@ def test_one_packet_that_claims_a_far_jump_or_a_reboot_is_not_believed(index, bo
     assert tracker.tally.samples == 100
 
 
+@pytest.mark.parametrize("bit", range(5, 32))
+def test_no_flipped_bit_of_an_index_ends_the_count(bit):
+    """Bits below the fifth move a packet by less than a hole that is interpolated."""
+    tracker, plain = ready(), ready()
+    whole = list(data_packets([10] * 100))
+    broken = Packet(
+        characteristic=wire.DATA,
+        data=bytes(byte ^ flip for byte, flip in zip(whole[40].data, flipped(whole[40].data, 2, bit), strict=True)),
+        at_ns=0,
+    )
+    run(tracker, [*whole[:40], broken, *whole[41:]])
+    run(plain, whole)
+    assert plain.steps["metronome"] - 1 <= tracker.steps["metronome"] <= plain.steps["metronome"]
+    assert tracker.tally.packets_bad + tracker.tally.packets_duplicate == 1
+    assert tracker.tally.samples_lost == 10
+
+
+def flipped(data, offset, bit):
+    """A mask as long as `data` with one bit set, counted from byte `offset`."""
+    mask = bytearray(len(data))
+    mask[offset + bit // 8] = 1 << bit % 8
+    return mask
+
+
+OURS = [wire.DATA, wire.CLOCK, wire.RATE, wire.SCALE, wire.BOOT, wire.DEVICE_ID]
+
+
+@given(values=st.lists(st.tuples(st.sampled_from(OURS), st.binary(max_size=60)), max_size=20), at=st.integers(0, 20))
+def test_any_bytes_on_any_characteristic_never_raise_and_counting_goes_on(values, at):
+    tracker = ready()
+    run(tracker, data_packets([10] * at))
+    run(tracker, [Packet(characteristic=uuid, data=data, at_ns=0) for uuid, data in values])
+    run(tracker, described(boot=9))
+    before = tracker.total
+    run(tracker, data_packets([10] * 30, boot=9))
+    assert tracker.total - before >= 10
+
+
+def test_a_device_that_starts_again_with_the_same_boot_number_is_found():
+    tracker = ready()
+    events = run(tracker, [*data_packets([10] * 50), *data_packets([10] * 50)])
+    assert only(events, Rebooted) == [Rebooted(boot=1, previous=1)]
+    assert tracker.tally.reboots == 1
+    assert tracker.total == 20 + 16
+
+
+def test_samples_sent_again_on_request_are_no_restart():
+    again = [
+        wire.encode(wire.DataPacket(boot=1, index=i, tick=0, counts=[(0, 0, 4096)] * 10, history=True))
+        for i in range(0, 300, 10)
+    ]
+    tracker = ready()
+    events = run(tracker, data_packets([10] * 50))
+    events += run(tracker, [Packet(characteristic=wire.DATA, data=data, at_ns=0) for data in again])
+    assert only(events, Rebooted) == []
+    assert tracker.tally.packets_duplicate == 30
+
+
 def test_two_that_agree_are_believed():
     tracker = ready()
     events = run(tracker, [*data_packets([10] * 5), *data_packets([10] * 5, start=2**30)])

@@ -77,6 +77,7 @@ def test_any_bytes_give_a_value_or_a_wire_error(uuid, data):
         (wire.SCALE, struct.pack("<H", 0), WireFault.VALUE),
         (wire.RATE, struct.pack("<H", 99), WireFault.VALUE),
         (wire.CLOCK, struct.pack("<IQ", 100, 0), WireFault.VALUE),
+        (wire.CLOCK, struct.pack("<IQ", 128, 1 << 42), WireFault.VALUE),
         (wire.BATTERY_LEVEL, b"\x65", WireFault.VALUE),
         (wire.DEVICE_ID, b"a/b", WireFault.VALUE),
         (wire.DEVICE_ID, b"", WireFault.VALUE),
