@@ -12,6 +12,7 @@ from math import atan2, sqrt
 from typing import Final
 
 DEPTH: Final = 256
+"""Samples: the longest step (100), the wait for its valley (121) and the filters' delay (8) have room in it."""
 CHANNELS: Final = 8
 GYROSCOPE: Final = 0
 MAGNETOMETER: Final = 3

@@ -197,7 +197,7 @@ def _extremum(s: State, kind: float, at: float, value: float, out: State, rows: 
         rows = _final(s, int(at), out, rows)
         _forget(s)
     if s[KIND] == kind:
-        if at < s[DUE] and s[DUE] < NEVER and kind * value > kind * s[VALUE]:
+        if s[DUE] < NEVER and kind * value > kind * s[VALUE]:
             s[AT], s[VALUE] = at, value
             if s[BEFORE] >= 0.0:
                 s[HALF] = at - s[BEFORE]

@@ -75,7 +75,7 @@ def take_pair(s: State, now: int, out: State, rows: int) -> int:
     first, last, shift = int(s[PREVIOUS]), int(at), int(s[DELAY])
     before = int(s[BEFORE_LAST])
     s[BEFORE_LAST], s[PREVIOUS] = s[PREVIOUS], at
-    measured = first >= 0 and last - first < s[MAX_STEP] and now - first + shift < DEPTH
+    measured = first >= 0 and last - first < s[MAX_STEP]
     distance = heading = 0.0
     if measured:
         heading = direction(s, MOTION, first - shift, last - shift)

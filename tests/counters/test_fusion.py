@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scipy.signal import butter, lfilter
 
 from service.counters import fusion_checks as checks
+from service.counters import fusion_kernel as kernel
 from service.counters import registry
 from service.counters.contract import with_overrides
 from service.counters.fusion import PAPER, TUNED, build, cutoffs_hz, first_cadence_hz, step_rows
@@ -165,6 +166,12 @@ def test_a_childs_first_half_step_admits_what_an_adults_rejects():
     assert first_cadence_hz(replace(wide, height_cm=80)) > 1.6 * first_cadence_hz(replace(wide, height_cm=230))
 
 
+def test_a_half_step_may_be_as_long_as_the_longest():
+    signal = walk(12.0, 1.0)
+    assert count(replace(FREE, longest_half=25), signal) == pytest.approx(12, abs=1)
+    assert count(replace(FREE, longest_half=24), signal) <= 1
+
+
 def test_rest_is_a_matter_of_peak_to_valley():
     signal = walk()
     swing_g = np.median(rows_of(FREE, signal)[:, PEAK] - rows_of(FREE, signal)[:, VALLEY])
@@ -179,14 +186,17 @@ def test_pseudo_zero_crossing_is_between_peak_and_valley():
     assert step.upper == step.lower == pytest.approx((step.peak + step.valley) / 2)
 
 
-def test_a_peak_below_the_last_crossing_is_suspect():
-    high, low = walk(6.0).values, walk(6.0).values
-    high[:, 2] += 1.0
-    signal = Signal(np.concatenate([high, low]))
-    free, strict = rows_of(FREE, signal), rows_of(STRICT, signal)
-    missed = set(free[:, AT]) - set(strict[:, AT])
-    assert any(300 <= at <= 340 for at in missed)
-    assert not any(at > 345 for at in missed)
+@pytest.mark.parametrize(("before_g", "after_g"), [(3.0, 0.0), (0.0, 3.0)])
+def test_a_pair_on_one_side_of_the_last_crossing_is_suspect(before_g, after_g):
+    """The norm's level falls by 3 g: the next peak lies below the crossing; it rises: the next valley lies above."""
+    before, after = walk(6.0).values, walk(6.0).values
+    before[:, 2] += before_g
+    after[:, 2] += after_g
+    signal = Signal(np.concatenate([before, after]))
+    at = rows_of(FREE, signal)[:, AT]
+    missed = set(at) - set(rows_of(STRICT, signal)[:, AT])
+    assert 1 <= len(missed) <= 2
+    assert all(300 <= k <= 360 for k in missed)
 
 
 SWINGS = {"swing_rad_s": 2.0, "turn": 0.5}
@@ -207,7 +217,7 @@ def test_a_swing_must_go_with_the_steps(arm, counted):
     moves = arm.get("field_ut") == "moves"
     signal = walk(**{**arm, "field_ut": 40.0})
     if moves:
-        signal.values[:, 6:] *= 1.0 + 0.3 * np.cos(np.pi * 2.0 * np.arange(len(signal)) / GRID_HZ)[:, None]
+        signal.values[:, 6:] *= 1.0 + 0.3 * np.sin(np.pi * 2.0 * np.arange(len(signal)) / GRID_HZ)[:, None]
     found = count(STRICT, signal)
     assert found >= 21 if counted else found <= 3
 
@@ -238,6 +248,18 @@ def test_every_step_goes_farther_than_the_share_of_the_last_three(signal, share,
         if distance > 0.0:
             assert len(last) < 3 or distance > share * sum(last[-3:]) / 3 * (1 - 1e-12), at
             last.append(distance)
+
+
+def test_the_first_three_displacements_pass():
+    """Two long steps and short ones: the third passes, the fourth falls short of 0.6 × the mean."""
+    signal = walk(4.0, forward_g=0.5)
+    signal.values[75:, 0] *= 0.3
+    rows = rows_of(FREE, signal)
+    assert (rows[:4, DISTANCE] > 0).tolist() == [False, True, True, True]
+    assert rows[3, DISTANCE] < 0.3 * rows[2, DISTANCE]
+    strict = rows_of(PAPER, signal)[:, AT]
+    assert strict[:4].tolist() == rows[:4, AT].tolist()
+    assert rows[4, AT] not in strict
 
 
 def test_shuffling_on_the_spot_after_a_walk_is_not_counted_until_a_pause():
@@ -287,6 +309,51 @@ def test_a_bout_goes_on_over_a_short_gap_only():
         late = [step for step in steps if step.at_s >= block.start / GRID_HZ]
         assert bool(late) is expected
         assert all(step.interval_s is None for step in late[:1])
+
+
+def test_an_uncertain_bout_ends_at_a_gap():
+    signal = walk(1.4)
+    free = count(FREE, signal)
+    counter = build(replace(FREE, bout=free + 1))
+    collect(counter, [signal.block()])
+    assert collect(counter, [signal.block(offset=len(signal) + 40)], finish=True).steps == []
+
+
+@few
+@given(signal=signals(), gap=st.integers(31, 400), preset=st.sampled_from([PAPER, TUNED]), seed=st.integers(0, 99))
+def test_no_check_looks_across_a_gap(signal, gap, preset, seed):
+    """A device that lay still in a turning field, then a gap: what follows is counted as from a fresh start."""
+    before = Signal(still(300))
+    before.values[:, 3:] = np.random.default_rng(seed).normal(0, 30, (300, 6))
+    params = replace(preset, irregular="suspect")
+    counter, offset = build(params), len(before) + gap
+    collect(counter, [before.block()])
+    after = collect(counter, [signal.block(offset=offset)], finish=True)
+    fresh = collect(build(params), [signal.block(offset=offset)], finish=True)
+    assert (after.steps, after.trace) == (fresh.steps, fresh.trace)
+
+
+def test_the_first_step_after_a_gap_has_no_displacement():
+    counter, signal = build(FREE), walk(4.0)
+    collect(counter, [signal.block()])
+    block = walk(4.0).block(offset=len(signal) + 31)
+    columns = (*block.acc_g, *block.gyro_rad_s, *block.mag_ut)
+    kernel.close(counter._state, [0.0] * 100)
+    kernel.begin(counter._state, block.start, *(column[0] for column in columns))
+    out = [0.0] * 2000
+    end = kernel.scan(*columns, len(block), counter._state, out)
+    rows = np.reshape(out[len(block) : end], (-1, 7))
+    assert len(rows) >= 6
+    assert rows[0, DISTANCE] == 0.0
+    assert (rows[1:, DISTANCE] > 0.0).all()
+
+
+def test_nothing_is_likely_at_rest():
+    counter = build(TUNED)
+    counter.update(walk(1.2).block())
+    after = counter.update(Signal(still(200)).block(offset=60))
+    assert after.likely == []
+    assert after.pending == 0
 
 
 def test_likely_steps_come_soon_and_bear_the_time_they_are_confirmed_with():
