@@ -12,7 +12,6 @@ import asyncio
 import contextlib
 import dataclasses
 import logging
-import math
 import signal
 import sys
 from collections.abc import Callable, Coroutine, Sequence
@@ -36,10 +35,8 @@ if TYPE_CHECKING:
 NOTHING_COUNTED = 1
 USAGE_ERROR = 2
 NO_BLUETOOTH = 3
-DEFAULT_AIR = "127.0.0.1:7400"
 BOOT_NS = 50_000_000
 """A simulated bracelet that starts again later than this has another boot number."""
-DEMO_WALK = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
 
 Command = Callable[[argparse.Namespace], Coroutine[Any, Any, int | None]]
 
@@ -213,7 +210,7 @@ async def _bench(options: argparse.Namespace) -> None:
         print(bench.WITHOUT_NUMBA, file=sys.stderr)
     figures = []
     for figure in bench.figures(names, options.samples):
-        print(f"{figure.name:<56}{figure.value:>15,.4g} {figure.unit}", flush=True)
+        print(f"{figure.name:<58}{figure.value:>15,.4g} {figure.unit}", flush=True)
         figures.append(dataclasses.asdict(figure))
         await asyncio.sleep(0)  # Ctrl-C is heeded here
     json_file.write_json(output, figures)
@@ -302,11 +299,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"steplink {version('steplink')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     demo = _command(commands, "demo", _demo, "see it work: a simulated bracelet, its radio and the service in one")
-    _add_settings(demo)
-    _add_bracelet(demo)
+    cli_options.add_settings(demo)
+    cli_options.add_bracelet(demo)
     serve = _command(commands, "serve", _serve, "run the service")
-    _add_settings(serve)
-    _add_air(serve)
+    cli_options.add_settings(serve)
+    cli_options.add_air(serve)
     serve.add_argument(
         "--connect",
         action="append",
@@ -316,14 +313,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     scan = _command(commands, "scan", _scan, "list the bracelets that are near")
     scan.add_argument(
-        "--seconds", type=_number(0.1, 600), default=5.0, help="how long to listen, 0.1–600 s (default 5)"
+        "--seconds", type=cli_options.number(0.1, 600), default=5.0, help="how long to listen, 0.1–600 s (default 5)"
     )
-    _add_air(scan)
+    cli_options.add_air(scan)
     sim = _command(commands, "sim", _sim, "run a simulated bracelet for `serve --air` in another terminal")
     sim.add_argument(
-        "--air", metavar="HOST:PORT", default=DEFAULT_AIR, help=f"where its radio is (default {DEFAULT_AIR})"
+        "--air",
+        metavar="HOST:PORT",
+        default=cli_options.DEFAULT_AIR,
+        help=f"where its radio is (default {cli_options.DEFAULT_AIR})",
     )
-    _add_bracelet(sim)
+    cli_options.add_bracelet(sim)
     evaluate = _command(commands, "evaluate", _evaluate, "count recordings and compare with their true steps")
     cli_options.add_evaluation(evaluate)
     bench = _command(commands, "bench", _bench, "measure how fast the counters are")
@@ -335,68 +335,6 @@ def _command(commands: Any, name: str, command: Command, text: str) -> argparse.
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
     parser.set_defaults(command=command)
     return parser
-
-
-def _add_settings(parser: argparse.ArgumentParser) -> None:
-    """Add an option for each of the service's settings."""
-    for field in dataclasses.fields(Settings):
-        meta = field.metadata
-        span = f", {meta['low']}–{meta['high']} {meta['unit']}".rstrip() if meta["low"] is not None else ""
-        repeated = isinstance(field.default, tuple)
-        parser.add_argument(
-            f"--{field.name.replace('_', '-')}",
-            type=str if repeated else type(field.default),
-            action="append" if repeated else "store",
-            default=[] if repeated else field.default,
-            metavar=(meta["unit"] or "TEXT").upper(),
-            help=f"{meta['text']}{span} (default {'none' if repeated else field.default})",
-        )
-
-
-def _add_air(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--air",
-        metavar="HOST:PORT",
-        nargs="?",
-        const=DEFAULT_AIR,
-        help=f"use the virtual radio of `steplink sim` there ({DEFAULT_AIR}) instead of this machine's Bluetooth",
-    )
-
-
-def _add_bracelet(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--recording", metavar="FILE", help="play this recording (.npz, .csv, the paper's layout)")
-    parser.add_argument(
-        "--lsb-per-g",
-        type=_number(1, 65535),
-        default=32.0,
-        help="scale of a recording in raw units, LSB/g (default 32)",
-    )
-    parser.add_argument(
-        "--walk", default=DEMO_WALK, help=f"what a synthetic walker does, in s each (default {DEMO_WALK})"
-    )
-    parser.add_argument("--seed", type=int, default=1, help="another seed, another walker (default 1)")
-    parser.add_argument(
-        "--speed", type=_number(0.01, math.inf), default=1.0, help="device seconds per second (default 1)"
-    )
-    parser.add_argument("--once", action="store_true", help="play once instead of for ever")
-    parser.add_argument("--name", default="Steplink", help="advertised name, at most 8 bytes (default Steplink)")
-    parser.add_argument("--id", default="sim-1", help="the bracelet's own id, 1–20 bytes (default sim-1)")
-    parser.add_argument(
-        "--packet-samples",
-        type=int,
-        default=10,
-        help="most samples of one packet; 0 fills the MTU, 10 at 50 Hz are 0.2 s (default 10)",
-    )
-
-
-def _number(low: float, high: float) -> Callable[[str], float]:
-    def number(text: str) -> float:
-        value = float(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text} is not in {low:g}–{high:g}")
-        return value
-
-    return number
 
 
 if __name__ == "__main__":

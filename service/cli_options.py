@@ -1,14 +1,87 @@
-"""Options of `steplink evaluate` and `steplink bench`, apart so that `service.cli` stays a list of commands."""
+"""Options of the commands, apart so that `service.cli` stays a list of what they do."""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import math
 import os
 from collections.abc import Callable
 from typing import Final
 
+from service.config import Settings
+
+DEFAULT_AIR: Final = "127.0.0.1:7400"
+DEMO_WALK: Final = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
+
 ONE_DAY: Final = 4_320_000
 """Samples of a bench: a day at 50 Hz."""
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add an option for each of the service's settings."""
+    for field in dataclasses.fields(Settings):
+        meta = field.metadata
+        span = f", {meta['low']}–{meta['high']} {meta['unit']}".rstrip() if meta["low"] is not None else ""
+        repeated = isinstance(field.default, tuple)
+        parser.add_argument(
+            f"--{field.name.replace('_', '-')}",
+            type=str if repeated else type(field.default),
+            action="append" if repeated else "store",
+            default=[] if repeated else field.default,
+            metavar=(meta["unit"] or "TEXT").upper(),
+            help=f"{meta['text']}{span} (default {'none' if repeated else field.default})",
+        )
+
+
+def add_air(parser: argparse.ArgumentParser) -> None:
+    """Add the virtual radio in place of this machine's."""
+    parser.add_argument(
+        "--air",
+        metavar="HOST:PORT",
+        nargs="?",
+        const=DEFAULT_AIR,
+        help=f"use the virtual radio of `steplink sim` there ({DEFAULT_AIR}) instead of this machine's Bluetooth",
+    )
+
+
+def add_bracelet(parser: argparse.ArgumentParser) -> None:
+    """Add what a simulated bracelet is and plays."""
+    parser.add_argument("--recording", metavar="FILE", help="play this recording (.npz, .csv, the paper's layout)")
+    parser.add_argument(
+        "--lsb-per-g",
+        type=number(1, 65535),
+        default=32.0,
+        help="scale of a recording in raw units, LSB/g (default 32)",
+    )
+    parser.add_argument(
+        "--walk", default=DEMO_WALK, help=f"what a synthetic walker does, in s each (default {DEMO_WALK})"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="another seed, another walker (default 1)")
+    parser.add_argument(
+        "--speed", type=number(0.01, math.inf), default=1.0, help="device seconds per second (default 1)"
+    )
+    parser.add_argument("--once", action="store_true", help="play once instead of for ever")
+    parser.add_argument("--name", default="Steplink", help="advertised name, at most 8 bytes (default Steplink)")
+    parser.add_argument("--id", default="sim-1", help="the bracelet's own id, 1–20 bytes (default sim-1)")
+    parser.add_argument(
+        "--packet-samples",
+        type=int,
+        default=10,
+        help="most samples of one packet; 0 fills the MTU, 10 at 50 Hz are 0.2 s (default 10)",
+    )
+
+
+def number(low: float, high: float) -> Callable[[str], float]:
+    """Return a reader of numbers from `low` to `high`."""
+
+    def read(text: str) -> float:
+        value = float(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not in {low:g}–{high:g}")
+        return value
+
+    return read
 
 
 def add_evaluation(parser: argparse.ArgumentParser) -> None:

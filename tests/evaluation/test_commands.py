@@ -133,7 +133,7 @@ def test_the_bench_prints_and_writes_its_figures_and_says_what_it_lacks(tmp_path
     assert "pip install 'steplink[fast]'" in answer.stderr
     figures = json.loads(out.read_text("utf-8"))
     assert all(set(figure) == {"name", "value", "unit"} for figure in figures)
-    assert [line[:56].strip() for line in answer.stdout.splitlines()] == [figure["name"] for figure in figures]
+    assert [line[:58].strip() for line in answer.stdout.splitlines()] == [figure["name"] for figure in figures]
     names = {figure["name"] for figure in figures}
     assert {"double_threshold offline plain", "double_threshold live", "find_peaks"} <= names
     assert not [name for name in names if "fast" in name]
