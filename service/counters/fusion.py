@@ -86,7 +86,8 @@ from service.counters.streaming import Events, Kernel, KernelCounter
 from service.samples import GRID_HZ, SampleBlock, Sensor, Step
 
 CADENCE_HZ: Final = {"male": 110.5 / 60, "female": 116.5 / 60, "unknown": 113.5 / 60}
-"""Steps a second of men and women in the street: Finley and Cody, Arch. Phys. Med. Rehabil. 51 (1970) 423; the mean."""
+"""Steps a second of men and women in the street as Finley and Cody, Arch. Phys. Med. Rehabil. 51 (1970) 423, are quoted
+(the paper itself was not at hand), and their mean."""
 
 STATURE_CM: Final = {"male": 176.0, "female": 163.0, "unknown": 169.5}
 """The stature we take them to have had."""
