@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from service.errors import ParameterError
 from service.evaluation.choices import find
 from service.evaluation.figures import agreement, bracelet, canvas, draw, phones
 from service.evaluation.figures.sources import cut, middle, sources, times_s
+from service.evaluation.papers import PAPERS
 from service.evaluation.rows import Row
 from service.samples import GRID_HZ
 
@@ -180,3 +182,9 @@ def test_times_are_of_5000_samples_and_stand_beside_the_published(tmp_path, seen
     here, published = seen["time"][0].containers
     assert [bar.get_height() for bar in here] == pytest.approx([0.001 * 5 / 3, 0.005])
     assert [bar.get_height() for bar in published] == [0.036]
+
+
+def test_the_guide_lists_every_figure_and_paper():
+    guide = resources.files("service").joinpath("guide/papers.md").read_text("utf-8")
+    assert [name for name in (*draw.SIGNALS, *draw.RESULTS) if f"`{name}.png`" not in guide] == []
+    assert [name for name in PAPERS if name not in guide] == []
