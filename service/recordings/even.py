@@ -11,13 +11,27 @@ import numpy as np
 
 from service.errors import RecordingError
 from service.recordings.recording import Floats, Recording
+from service.samples import GRID_HZ
 
 MAX_SAMPLES: Final = 50_000_000
 """About six days at 100 Hz; one wrong stamp must not fill the memory with samples that nobody measured."""
 
 
+UNEVEN_BY: Final = 0.1
+"""A spacing that differs by more than this share of the nominal one is uneven."""
+UNEVEN_SHARE: Final = 0.001
+"""A recording with more uneven spacings than this was not sampled at one rate."""
+
+
 def stated_rate_hz(recording: Recording) -> float:
-    """Return the recording's nominal rate in whole hundredths of Hz, as a device states it."""
+    """Return the rate a device would state for the recording, in whole hundredths of Hz.
+
+    The nominal one; GRID_HZ where the stamps are uneven, so that samples are interpolated once, from where they were
+    measured, and not twice.
+    """
+    uneven = np.abs(np.diff(recording.t_s) * recording.rate_hz - 1) > UNEVEN_BY
+    if uneven.mean() > UNEVEN_SHARE:
+        return float(GRID_HZ)
     return max(1, round(recording.rate_hz * 100)) / 100
 
 
