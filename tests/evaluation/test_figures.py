@@ -4,6 +4,7 @@ import dataclasses
 import sys
 from importlib import resources
 
+import matplotlib.image
 import numpy as np
 import pytest
 from evaluation.made import save, still, walk
@@ -16,7 +17,6 @@ from service.evaluation.papers import PAPERS
 from service.evaluation.rows import Row
 from service.samples import GRID_HZ
 
-matplotlib = pytest.importorskip("matplotlib")
 PNG = b"\x89PNG\r\n\x1a\n"
 
 

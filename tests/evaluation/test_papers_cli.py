@@ -11,8 +11,6 @@ from service.evaluation.papers import PAPERS
 from service.evaluation.papers.conditions import Condition, Method, Paper, Table
 from service.evaluation.papers.conditions import walk as steps
 
-pytest.importorskip("matplotlib")
-
 
 @pytest.fixture
 def short(monkeypatch):
