@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from service.evaluation.rows import Row
     from service.links.ble import Backend
     from service.pipeline.supervisor import Supervisor
+    from service.recordings import ColumnMapping
 
 NOTHING_COUNTED = 1
 USAGE_ERROR = 2
@@ -148,7 +149,7 @@ async def _evaluate(options: argparse.Namespace) -> int:
         return 0
     names, paths = choices.counters_and_paths(options.counter, options.path)
     chosen = choices.choices(names, options.preset or "tuned", options.param)
-    found, passed = choices.find(paths)
+    found, passed = choices.find(paths, _mapping(options))
     output, folder = json_file.checked_path(options.json), _figures_folder(options)
     if passed:
         print(f"steplink: passed over texts without acceleration: {', '.join(passed)}", file=sys.stderr)
@@ -287,7 +288,14 @@ def _source(options: argparse.Namespace) -> Source:
         return WalkerSource(options.walk, seed=options.seed, loop=not options.once)
     from service.recordings import read  # noqa: PLC0415
 
-    return RecordingSource(read(options.recording, lsb_per_g=options.lsb_per_g), loop=not options.once)
+    recording = read(options.recording, lsb_per_g=options.lsb_per_g, mapping=_mapping(options))
+    return RecordingSource(recording, loop=not options.once)
+
+
+def _mapping(options: argparse.Namespace) -> ColumnMapping | None:
+    from service.recordings import column_mapping  # noqa: PLC0415
+
+    return None if options.columns is None else column_mapping(options.columns, options.units, options.time_unit)
 
 
 def _settings(options: argparse.Namespace) -> Settings:

@@ -45,9 +45,21 @@ def add_air(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Add how a table that is no format of ours is read."""
+    parser.add_argument(
+        "--columns",
+        metavar="time=T,x=X,y=Y,z=Z",
+        help="read texts as tables with these columns: names of the header, or numbers from 1; time may be missing",
+    )
+    parser.add_argument("--units", default="g", help="with --columns: acceleration in g, mg or m/s2 (default g)")
+    parser.add_argument("--time-unit", default="s", help="with --columns: time in s, ms, us or ns (default s)")
+
+
 def add_bracelet(parser: argparse.ArgumentParser) -> None:
     """Add what a simulated bracelet is and plays."""
-    parser.add_argument("--recording", metavar="FILE", help="play this recording (.npz, .csv, the paper's layout)")
+    parser.add_argument("--recording", metavar="FILE", help="play this recording; README lists the formats")
+    add_columns(parser)
     parser.add_argument(
         "--lsb-per-g",
         type=number(1, 65535),
@@ -87,6 +99,7 @@ def number(low: float, high: float) -> Callable[[str], float]:
 def add_evaluation(parser: argparse.ArgumentParser) -> None:
     """Add what `evaluate` takes."""
     parser.add_argument("path", metavar="PATH", nargs="*", help="a recording, or a folder that is searched through")
+    add_columns(parser)
     _add_counter(parser, "counters to evaluate, or all (default double_threshold)")
     parser.add_argument(
         "--preset", choices=("paper", "tuned"), help="their parameters (default tuned, with --paper the published ones)"

@@ -1,5 +1,6 @@
 """The commands as a user types them: what they print, how they end, and one clear line for whatever is wrong."""
 
+import json
 import os
 import signal
 import socket
@@ -136,6 +137,23 @@ def test_a_demo_that_has_played_its_recording_shows_the_bracelet_gone():
         wait_for(lambda: (found := first_device(port)) and found["state"] == "lost" and found["steps"] > 5)
         assert first_device(port)["cadence_spm"] is None
         assert "has been played" in ends_cleanly(demo, signal.SIGINT)
+
+
+def test_a_table_of_somebodys_own_is_evaluated_and_played_by_its_columns(tmp_path):
+    walk = [9.81 * (1 + 0.6 * np.sin(2 * np.pi * 2 * i / 50)) for i in range(1000)]
+    path = tmp_path / "own.csv"
+    path.write_text("ms;ax;ay;az\n" + "".join(f"{20 * i};0;0;{az:.4f}\n" for i, az in enumerate(walk)))
+    words = ["--columns", "time=ms,x=ax,y=ay,z=az", "--units", "m/s2", "--time-unit", "ms"]
+    answer = run("evaluate", path, *words, "--json", tmp_path / "rows.json", timeout=60)
+    assert answer.returncode == 0, answer.stderr
+    (row,) = json.loads((tmp_path / "rows.json").read_text())
+    assert row["steps"] == pytest.approx(40, abs=3)
+    port = free_port()
+    with running("demo", "--port", port, "--recording", path, *words, "--speed", 4):
+        wait_for(lambda: (found := first_device(port)) and found["steps"] > 5)
+    wrong = run("evaluate", path, "--columns", "x=ax", timeout=30)
+    assert wrong.returncode == 2
+    assert "Traceback" not in wrong.stderr
 
 
 def test_without_bluetooth_scan_says_what_to_do():

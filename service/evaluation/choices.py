@@ -11,18 +11,19 @@ from typing import Final
 from service.counters import registry
 from service.errors import ParameterError
 from service.evaluation.rows import Choice
-from service.recordings import is_recording, suffixes
+from service.recordings import ColumnMapping, is_recording, suffixes
 
 ALL: Final = "all"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """A file to evaluate: its path as it was asked for (`shown`) and as it is, and its folder's name."""
+    """A file to evaluate: its path as it was asked for (`shown`) and as it is, its folder's name, its columns."""
 
     shown: str
     path: Path
     dataset: str
+    mapping: ColumnMapping | None = None
 
 
 def choices(counters: Sequence[str], preset: str, params: Sequence[str]) -> list[Choice]:
@@ -61,8 +62,10 @@ def counters_and_paths(words: Sequence[str], paths: Sequence[str]) -> tuple[list
     return names or [registry.DEFAULT], [*paths, *(word for word in words if word not in names)]
 
 
-def find(paths: Sequence[str]) -> tuple[list[Found], list[str]]:
+def find(paths: Sequence[str], mapping: ColumnMapping | None = None) -> tuple[list[Found], list[str]]:
     """Return the recordings at `paths`, folders searched through, and what was passed over in them.
+
+    With a `mapping`, every text is read as a table of those columns.
 
     Passed over are hidden files and texts that are no recording; a file named by itself never is. ParameterError where
     a path does not exist or there is no recording at all.
@@ -76,12 +79,12 @@ def find(paths: Sequence[str]) -> tuple[list[Found], list[str]]:
         if not path.exists():
             raise ParameterError("PATH", text, "no such file or folder")
         if not path.is_dir():
-            found.append(_found(text, path))
+            found.append(_found(text, path, mapping))
             continue
         for file in _files(path):
             shown = f"{text.rstrip('/') or '/'}/{file.relative_to(path).as_posix()}"
-            if is_recording(file):
-                found.append(_found(shown, file))
+            if is_recording(file, mapping):
+                found.append(_found(shown, file, mapping))
             else:
                 passed.append(shown)
     if not found:
@@ -97,5 +100,5 @@ def _files(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _found(shown: str, path: Path) -> Found:
-    return Found(shown=shown, path=path, dataset=path.resolve().parent.name)
+def _found(shown: str, path: Path, mapping: ColumnMapping | None) -> Found:
+    return Found(shown=shown, path=path, dataset=path.resolve().parent.name, mapping=mapping)

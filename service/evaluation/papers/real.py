@@ -67,7 +67,7 @@ def wanted(paper: Paper, found: Sequence[Found], lsb_per_g: float) -> list[Found
 
 def _is_wanted(paper: Paper, file: Found, lsb_per_g: float) -> bool:
     try:
-        recording = read(file.path, lsb_per_g=lsb_per_g)
+        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping)
     except SteplinkError:
         return False
     known = recording.true_steps is not None or recording.step_t_s is not None
