@@ -27,6 +27,9 @@ HCI_TIMEOUT_S: Final = 5.0
 """A controller answers in milliseconds; one that does not is gone."""
 STALL_S: Final = 5.0
 """A host that takes no packet for so long has lost the link, as by a supervision timeout."""
+UNASKED_S: Final = 5.0
+"""A host asks for the MTU at once. A link on which nothing is asked for so long has no host: it was cancelled while it
+was being made, and that was told before the link was."""
 UNSENT_PACKETS: Final = 16
 """Packets the controller may hold before the sender waits for it."""
 ADVERTISING_INTERVAL_MS: Final = 31.25
@@ -91,6 +94,10 @@ class Peripheral:
         self._on_subscribed = on_subscribed
         self._subscribed = False
         self._link: Connection | None = None
+        self._asked = False
+        """Whether the host of the present link has asked for anything."""
+        self._silent: Connection | None = None
+        """A link whose host never asked for anything, to be given up."""
         self._advertising = False
         self._lost = transport.source.terminated
         self._changed = asyncio.Event()
@@ -127,6 +134,7 @@ class Peripheral:
         while not self._lost.done():
             await self._changed.wait()
             self._changed.clear()
+            await self._give_up_silent()
             await self.settle()
 
     async def settle(self) -> None:
@@ -195,16 +203,34 @@ class Peripheral:
             raise LinkError(LinkFault.NO_ADAPTER, "the bracelet's controller does not answer")
 
     def _on_connection(self, link: Connection) -> None:
-        self._link = link
+        self._link, self._asked = link, False
         self._advertising = False  # a controller stops of itself when it is connected
         self.links_made += 1
-        link.once(Connection.EVENT_DISCONNECTION, self._on_disconnection)
+        link.once(Connection.EVENT_DISCONNECTION, lambda _: self._on_disconnection(link))
+        asyncio.get_running_loop().call_later(UNASKED_S, self._suspect, link)
         self._changed.set()
 
-    def _on_disconnection(self, _reason: int) -> None:
+    def _on_disconnection(self, link: Connection) -> None:
+        if self._link is not link:  # one that has been given up, or whose end is told after the next one's beginning
+            return
         self._link = None
         self._subscribed = False
         self._changed.set()
+
+    def _suspect(self, link: Connection) -> None:
+        if self._link is link and not self._asked:
+            self._silent = link
+            self._changed.set()
+
+    async def _give_up_silent(self) -> None:
+        link, self._silent = self._silent, None
+        if link is None:
+            return
+        self._on_disconnection(link)
+        command = hci.HCI_Disconnect_Command(
+            connection_handle=link.handle, reason=hci.HCI_ErrorCode.REMOTE_USER_TERMINATED_CONNECTION_ERROR
+        )
+        await self._hci(self.device.send_async_command(command, check_status=False))
 
     def _on_subscription(self, _bearer: object, notify: bool, _indicate: bool) -> None:
         self._subscribed = notify
@@ -212,6 +238,7 @@ class Peripheral:
             self._on_subscribed()
 
     def _on_att(self, handle: int, pdu: bytes) -> None:
+        self._asked = True
         if not self.muted:
             self.device.on_gatt_pdu(handle, pdu)
 
