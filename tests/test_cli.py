@@ -72,7 +72,7 @@ def ends_cleanly(process, sent):
     return out
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.full)])
 def test_the_demo_counts_and_ends(sent):
     port = free_port()
     with running("demo", "--port", port) as demo:
@@ -82,6 +82,7 @@ def test_the_demo_counts_and_ends(sent):
     assert f"http://127.0.0.1:{port}/" in out
 
 
+@pytest.mark.full
 def test_a_bracelet_in_one_terminal_and_the_service_in_another():
     port, air = free_port(), f"127.0.0.1:{free_port()}"
     with running("serve", "--air", air, "--port", port) as serve:
@@ -139,6 +140,7 @@ def test_a_demo_that_has_played_its_recording_shows_the_bracelet_gone():
         assert "has been played" in ends_cleanly(demo, signal.SIGINT)
 
 
+@pytest.mark.full
 def test_a_table_of_somebodys_own_is_evaluated_and_played_by_its_columns(tmp_path):
     walk = [9.81 * (1 + 0.6 * np.sin(2 * np.pi * 2 * i / 50)) for i in range(1000)]
     path = tmp_path / "own.csv"

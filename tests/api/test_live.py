@@ -64,6 +64,7 @@ async def test_the_signal_holds_the_thresholds_and_the_peaks_of_the_steps(walk):
     assert any(message["bands"] for message in heard if message["type"] == "signal")
 
 
+@pytest.mark.full
 async def test_a_step_is_told_within_a_quarter_second_of_its_peak_then_confirmed_or_retracted():
     async with staged(Bracelet(Walker("normal:600", seed=3))) as stage, stage.live() as feed:
         began, heard = time.time(), []

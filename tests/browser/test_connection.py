@@ -6,6 +6,8 @@ from browser.scripted import ORIGIN, counting, device
 from browser.test_page import field
 from playwright.sync_api import Page, expect
 
+pytestmark = pytest.mark.full
+
 LONGEST_WAIT_MS = 15_000
 
 

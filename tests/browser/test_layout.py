@@ -7,6 +7,8 @@ from browser.conftest import Scripted
 from browser.scripted import WEB, device, state
 from playwright.sync_api import expect
 
+pytestmark = pytest.mark.full
+
 SIZES = {"phone": (390, 844), "narrow": (320, 640), "desktop": (1440, 900)}
 
 

@@ -8,6 +8,8 @@ from browser.conftest import Scripted
 from browser.scripted import AT, ORIGIN, ScriptedServer, counting, device, signal, step
 from playwright.sync_api import Page, expect
 
+pytestmark = pytest.mark.full
+
 LEFT, RIGHT, TOP, BOTTOM = 40, 14, 24, 26
 """The plot's margins in px, where its axes are written (PAD in plot.js)."""
 HATCHED = 10

@@ -30,7 +30,11 @@ OUTSIDE = {
 few = settings(max_examples=40, deadline=None)
 
 
-@pytest.fixture(params=VARIANTS, ids=lambda v: f"{v[0]}-{v[1]}", scope="module")
+@pytest.fixture(
+    params=[pytest.param(v, marks=pytest.mark.full if v[1] == "paper" else ()) for v in VARIANTS],
+    ids=[f"{name}-{preset}" for name, preset in VARIANTS],
+    scope="module",
+)
 def make(request: pytest.FixtureRequest) -> Make:
     return partial(registry.make, *request.param)
 
