@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 def parse_address(address: str) -> tuple[str, int]:
-    """Return host and port of "HOST:PORT"; ParameterError where it is none, or not loopback."""
+    """Return host and port of "HOST:PORT"; ParameterError where it is none, not loopback, or no port 1…65535."""
     host, _, port = address.rpartition(":")
     host = host.strip("[]")
     try:
@@ -42,17 +42,17 @@ def parse_address(address: str) -> tuple[str, int]:
         number = int(port)
     except ValueError:
         raise ParameterError("air", address, "HOST:PORT is wanted, for instance 127.0.0.1:7400") from None
-    if not loopback or not 0 <= number <= 0xFFFF:
-        raise ParameterError("air", address, "a loopback address and a port to 65535: the air has no authentication")
+    if not loopback or not 1 <= number <= 0xFFFF:
+        raise ParameterError("air", address, "a loopback address and a port 1…65535: the air has no authentication")
     return host, number
 
 
 class AirServer:
-    """Serves a LocalAir on a loopback port while entered; port 0 takes a free one, which `address` then tells."""
+    """Serves a LocalAir on a loopback port while entered; without an address on a free one, which `address` tells."""
 
-    def __init__(self, air: LocalAir, address: str = "127.0.0.1:0", *, max_sockets: int = MAX_SOCKETS) -> None:
+    def __init__(self, air: LocalAir, address: str | None = None, *, max_sockets: int = MAX_SOCKETS) -> None:
         self._air = air
-        self._host, self._port = parse_address(address)
+        self._host, self._port = ("127.0.0.1", 0) if address is None else parse_address(address)
         self._max_sockets = max_sockets
         self._sockets: set[_RadioSocket] = set()
         self._refused = 0

@@ -21,7 +21,7 @@ from bumble import att, hci
 from bumble.core import BaseBumbleError
 from bumble.device import Advertisement, Connection, Device
 
-from device_sim.controller import Air
+from device_sim.controller import Air, AirHost
 from device_sim.operations import Operations
 from service.errors import LinkError
 
@@ -86,19 +86,19 @@ class Central:
             attempt = self._operations.spawn(device.connect(address, timeout=None))
             try:
                 await asyncio.wait({attempt})
-            finally:
+            except asyncio.CancelledError:
+                # Also where the attempt is done: a cancellation may come in the turn in which the link was made.
+                attempt.add_done_callback(self._give_up)
                 if not attempt.done():
                     await self._abandon(device, attempt)
+                raise
             return outcome(attempt)
 
     async def disconnect(self, connection: Connection) -> None:
         """Ask for the end of a connection; its event tells when it has ended."""
         if connection.device is not self._device or self._device_lost():
             return
-        command = hci.HCI_Disconnect_Command(
-            connection_handle=connection.handle, reason=hci.HCI_ErrorCode.REMOTE_USER_TERMINATED_CONNECTION_ERROR
-        )
-        await self._command(connection.device.send_async_command(command, check_status=False))
+        await self._command(_disconnect(connection))
 
     async def listen(self, listener: Listener) -> None:
         """Call `listener` with every advertisement from now on; after the air was lost, once it is opened again."""
@@ -130,7 +130,7 @@ class Central:
     async def _open(self) -> Device:
         transport = await self._attachment.enter_async_context(self._air.attach(self._name))
         address = hci.Address.generate_static_address()
-        device = Device.with_hci(self._name, address, transport.source, transport.sink)
+        device = Device(name=self._name, address=address, host=AirHost(transport.source, transport.sink))
         async with asyncio.timeout(HCI_TIMEOUT_S):
             await device.power_on()
             if self._listeners:
@@ -164,13 +164,19 @@ class Central:
             raise BleakError(f"{error}: the controller was given up, the next use opens it anew") from error
 
     async def _abandon(self, device: Device, attempt: asyncio.Task[Connection]) -> None:
-        """End an attempt to connect, and the connection too where it was made in the last moment."""
+        """End an attempt to connect."""
         self._operations.spawn(device.send_sync_command(hci.HCI_LE_Create_Connection_Cancel_Command()))
         await asyncio.wait({attempt}, timeout=CANCEL_TIMEOUT_S)
         if not attempt.done():
             await self._close()
-        elif not attempt.cancelled() and attempt.exception() is None:
-            self._operations.spawn(attempt.result().disconnect())
+
+    def _give_up(self, attempt: asyncio.Task[Connection]) -> None:
+        """End a connection that was made for nobody: its peer would take no other, nor advertise, for ever."""
+        if attempt.cancelled() or attempt.exception() is not None:
+            return
+        connection = attempt.result()
+        if connection.device is self._device and connection.handle in connection.device.connections:
+            self._operations.spawn(_disconnect(connection))
 
 
 def outcome(task: asyncio.Task[T]) -> T:
@@ -185,6 +191,13 @@ def outcome(task: asyncio.Task[T]) -> T:
     if isinstance(error, BaseBumbleError):
         raise BleakError(f"{type(error).__name__}: {error}") from error
     raise error
+
+
+async def _disconnect(connection: Connection) -> None:
+    command = hci.HCI_Disconnect_Command(
+        connection_handle=connection.handle, reason=hci.HCI_ErrorCode.REMOTE_USER_TERMINATED_CONNECTION_ERROR
+    )
+    await connection.device.send_async_command(command, check_status=False)
 
 
 async def _scan(device: Device) -> None:

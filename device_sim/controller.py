@@ -2,7 +2,8 @@
 
 Found in bumble 0.0.236 and mended here, each where it is mended: a connect that cannot be cancelled, a connection to a
 device that has just stopped advertising, a disconnect that never ends because the peer has left, 27-byte packets, and
-flow control that ends at the controller, so that a slow host is flooded.
+flow control that ends at the controller, so that a slow host is flooded. What is sent on a link in the moment of its
+end is dropped, as on a real radio; bumble does so too, but with a warning for each packet.
 """
 
 from __future__ import annotations
@@ -68,6 +69,15 @@ class AirLink(LocalLink):
                 loop.call_soon(radio.on_ll_advertising_pdu, packet)
 
 
+class AirHost(Host):
+    """A host whose answers to a link that has just ended are dropped: their tasks cannot know yet."""
+
+    def send_acl_sdu(self, connection_handle: int, sdu: bytes) -> None:
+        """Send where there is a link to send on."""
+        if connection_handle in self.connections:
+            super().send_acl_sdu(connection_handle, sdu)
+
+
 class Radio(Controller):
     """One participant's controller. It has a random address only: the link sends from that one."""
 
@@ -130,12 +140,24 @@ class Radio(Controller):
     def on_hci_acl_data_packet(self, packet: hci.HCI_AclDataPacket) -> None:
         """Pass a packet on; where the peer's host is behind, withhold the sender's credit until it has caught up."""
         connection = self.find_le_connection_by_handle(packet.connection_handle)
-        peer = connection and self.air.find_le_controller(connection.peer_address)
-        if connection is not None and isinstance(peer, Radio) and peer.congested:
+        if connection is None:
+            return  # its end is on its way to the host
+        peer = self.air.find_le_controller(connection.peer_address)
+        if isinstance(peer, Radio) and peer.congested:
             connection.assembler.feed_packet(packet)
             peer._withheld.append((self, connection.handle))  # noqa: SLF001
         else:
             super().on_hci_acl_data_packet(packet)
+
+    def on_link_acl_data(self, sender_address: hci.Address, transport: core.PhysicalTransport, data: bytes) -> None:
+        """Take data from the air; what is late for its link is dropped."""
+        if sender_address in self.le_connections:
+            super().on_link_acl_data(sender_address, transport, data)
+
+    def on_ll_control_pdu(self, sender_address: hci.Address, packet: ll.ControlPdu) -> None:
+        """Take a control packet; where both ends disconnect at once, the other's word comes after the end."""
+        if sender_address in self.le_connections:
+            super().on_ll_control_pdu(sender_address, packet)
 
     def set_congested(self, *, congested: bool) -> None:
         """Say whether this radio's host is behind; release what was withheld from its peers when it is not."""

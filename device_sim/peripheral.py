@@ -15,10 +15,10 @@ from bumble import att, data_types, hci
 from bumble.core import UUID, AdvertisingData, BaseBumbleError
 from bumble.device import Connection, Device, DeviceConfiguration
 from bumble.gatt import Characteristic, CharacteristicValue, Service
-from bumble.host import Host
 from bumble.transport.common import Transport
 
 from device_sim.bracelet import Bracelet
+from device_sim.controller import AirHost
 from device_sim.operations import Operations
 from service.errors import LinkError, LinkFault, ParameterError
 from service.wearables import bracelet as wire
@@ -81,7 +81,7 @@ class Peripheral:
             advertising_interval_min=ADVERTISING_INTERVAL_MS,
             advertising_interval_max=ADVERTISING_INTERVAL_MS,
         )
-        host = Host(transport.source, transport.sink)
+        host = AirHost(transport.source, transport.sink)
         self.device = Device(config=config, host=host)
         self.device.gatt_server.max_mtu = max_mtu
         self.muted = False
@@ -232,7 +232,9 @@ class Peripheral:
         )
         await self._hci(self.device.send_async_command(command, check_status=False))
 
-    def _on_subscription(self, _bearer: object, notify: bool, _indicate: bool) -> None:
+    def _on_subscription(self, bearer: object, notify: bool, _indicate: bool) -> None:
+        if bearer is not self._link:
+            return  # bumble handles a write in a task of its own, which may outlive the link
         self._subscribed = notify
         if notify:
             self._on_subscribed()

@@ -203,7 +203,9 @@ async def test_a_host_that_does_not_read_holds_its_sender_back(server, radio):
 
 
 async def test_an_air_is_hosted_once_and_joined_after(radio):
-    async with hosted_air("127.0.0.1:0") as air:
+    async with LocalAir() as local, AirServer(local) as server:
+        free = server.address
+    async with hosted_air(free) as air:
         assert isinstance(air, LocalAir)
     async with (
         LocalAir() as local,
@@ -216,7 +218,20 @@ async def test_an_air_is_hosted_once_and_joined_after(radio):
 
 
 @pytest.mark.parametrize(
-    "wrong", ["", "7400", "127.0.0.1", "127.0.0.1:", "127.0.0.1:x", "0.0.0.0:1", "1.2.3.4:1", "::1:x"]
+    "wrong",
+    [
+        "",
+        "7400",
+        "127.0.0.1",
+        "127.0.0.1:",
+        "127.0.0.1:x",
+        "0.0.0.0:1",
+        "1.2.3.4:1",
+        "::1:x",
+        "127.0.0.1:0",
+        "127.0.0.1:-1",
+        "127.0.0.1:65536",
+    ],
 )
 def test_only_loopback_addresses_are_taken(wrong):
     with pytest.raises(ParameterError):
@@ -225,7 +240,7 @@ def test_only_loopback_addresses_are_taken(wrong):
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("127.0.0.1:7400", ("127.0.0.1", 7400)), ("[::1]:1", ("::1", 1)), ("localhost:0", ("localhost", 0))],
+    [("127.0.0.1:7400", ("127.0.0.1", 7400)), ("[::1]:1", ("::1", 1)), ("localhost:65535", ("localhost", 65535))],
 )
 def test_addresses(text, expected):
     assert parse_address(text) == expected
