@@ -40,11 +40,11 @@ class Endless(Known):
         return self.acc_g[index]
 
 
-async def until(condition, *, within_s=5.0):
-    """Wait until `condition()` holds."""
+async def until(condition, *, within_s=5.0, every_s=0.002):
+    """Wait until `condition()` holds; with `every_s` 0 it is asked in each turn of the loop."""
     async with asyncio.timeout(within_s):
         while not condition():  # noqa: ASYNC110  # what is waited for has no event
-            await asyncio.sleep(0.002)
+            await asyncio.sleep(every_s)
 
 
 class Host:

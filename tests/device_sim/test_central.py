@@ -58,9 +58,12 @@ async def storm(radio, stage, caplog, *, seed, rounds):
     caplog.set_level(logging.WARNING, logger="bumble")
     for _ in range(rounds):
         task = asyncio.create_task(_stream(radio, backends, device))
-        for _ in range(moments.randrange(60)):
+        if moments.random() < 0.5:
+            await radio.until(lambda: gatt.connected, every_s=0)  # the worst moment is a few turns later
+        else:
+            await asyncio.sleep(moments.uniform(0, 0.12))
+        for _ in range(moments.randrange(12)):
             await asyncio.sleep(0)
-        await asyncio.sleep(moments.choice([0, moments.uniform(0, 0.12)]))
         task.cancel()
         await asyncio.wait({task})
         assert task.cancelled(), task.exception()
