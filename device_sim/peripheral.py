@@ -28,8 +28,8 @@ HCI_TIMEOUT_S: Final = 5.0
 STALL_S: Final = 5.0
 """A host that takes no packet for so long has lost the link, as by a supervision timeout."""
 UNASKED_S: Final = 5.0
-"""A host asks for the MTU at once. A link on which nothing is asked for so long has no host: it was cancelled while it
-was being made, and that was told before the link was."""
+"""A host asks for the MTU at once. A link on which nothing is asked for so long has nobody at its other end who wants
+it: a foreign or killed host. It is given up, or the bracelet would never advertise again."""
 UNSENT_PACKETS: Final = 16
 """Packets the controller may hold before the sender waits for it."""
 ADVERTISING_INTERVAL_MS: Final = 31.25
