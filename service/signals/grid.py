@@ -29,15 +29,15 @@ def scan(
     out: MutableSequence[float],
 ) -> int:
     """Place n samples; write the grid points they complete into `out` (x, y, z by turns); return how many."""
-    start, first, pace = s[0], s[1], s[2]
-    i, before, k = s[3], s[4], s[5]
-    px, py, pz = s[6], s[7], s[8]
+    start, first, pace = s[START], s[FIRST], s[PACE]
+    i, before, k = s[INDEX], s[PLACE], s[NEXT]
+    px, py, pz = s[X], s[Y], s[Z]
     m = 0
     for j in range(n):
         place = start + (i - first) * pace
         cx, cy, cz = x[j], y[j], z[j]
-        while k <= place + 1e-6:
-            if place - k < 1e-6:
+        while k <= place + EPSILON:
+            if place - k < EPSILON:
                 out[m], out[m + 1], out[m + 2] = cx, cy, cz
             else:
                 part = (k - before) / (place - before)
@@ -49,6 +49,6 @@ def scan(
         i += 1.0
         before = place
         px, py, pz = cx, cy, cz
-    s[3], s[4], s[5] = i, before, k
-    s[6], s[7], s[8] = px, py, pz
+    s[INDEX], s[PLACE], s[NEXT] = i, before, k
+    s[X], s[Y], s[Z] = px, py, pz
     return m // 3
