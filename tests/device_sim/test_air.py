@@ -16,6 +16,8 @@ from device_sim.air_tcp import AirServer, RemoteAir, hosted_air, open_air, parse
 from device_sim.bracelet import Bracelet
 from service.errors import LinkError, LinkFault, ParameterError
 
+pytestmark = pytest.mark.full
+
 BRACELET_PROCESS = """
 import asyncio, sys
 import numpy as np

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from evaluation.made import save, still, walk
 
+pytestmark = pytest.mark.full
+
 ENDS_WITHIN_S = 2.0
 
 
