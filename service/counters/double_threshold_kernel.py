@@ -13,6 +13,8 @@ from collections.abc import MutableSequence, Sequence
 from math import sqrt
 from typing import Final
 
+from service.samples import Likely
+
 # Constants of an instance.
 Y_WEIGHT: Final = 0  # 1 for the norm, 0 for √(X²+Z²)
 HALF: Final = 1  # N of (7), (8)
@@ -159,30 +161,50 @@ def stop(s: State) -> None:
 
 
 def pending(s: State) -> int:
-    """Return how many peaks are likely to become steps."""
-    return len(likely(s))
+    """Return how many peaks pass what is known of the rules."""
+    return sum(passes for _, _, passes in likely(s))
 
 
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return index and height of the peaks that are likely to become steps.
+def likely(s: State) -> list[Likely]:
+    """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
-    Those are the held ones of a bout that is not certain yet, and undecided ones above T_H that rise above L by more
-    than rest.
+    Those are the held ones of a bout that can still become certain, and all undecided ones that no rule excludes yet.
+    One passes if it does by the thresholds of the last window and no other that does lies too near before it.
     """
-    found: list[tuple[float, float]] = []
-    if s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT] and s[NEXT] - s[HALF] - s[LAST] < s[MAX_SPACING]:
-        for i in range(int(s[BOUT_PEAKS])):
-            held = HELD + i * ROW
-            found.append((s[held + 1], s[held + 3] - s[held + 4]))
-    if s[HIGH_KNOWN] == 0.0 or s[LOW_KNOWN] == 0.0:
-        return found
-    upper, low, rest = (s[HIGH] + s[LOW]) / 2.0, s[LOW], s[REST]
-    head, capacity = int(s[HEAD]), int(s[CAPACITY])
-    for i in range(int(s[COUNT])):
-        q = QUEUE + (head + i) % capacity * ENTRY
-        if s[q + PEAK] > upper and s[q + PEAK] - low >= rest:
-            found.append((s[q + AT], s[q + PEAK] - low))
-    return found
+    known, last = s[BOUT_PEAKS] > 0.0, s[LAST]
+    goes_on = s[NEXT] - s[HALF] - last < s[MAX_SPACING]
+    waiting: list[Likely] = []
+    if s[COUNT] > 0.0:
+        upper, low = s[HIGH], s[FILTERED]
+        in_force = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+        if in_force:
+            upper, low = (s[HIGH] + s[LOW]) / 2.0, s[LOW]
+        nearest, passed = s[MIN_SPACING], last if known else -s[MAX_SPACING]
+        head, capacity, rank = int(s[HEAD]), int(s[CAPACITY]), 0.0 if s[CREDIT] == 0.0 else s[BOUT]
+        for i in range(int(s[COUNT])):
+            q = QUEUE + (head + i) % capacity * ENTRY
+            at, peak = s[q + AT], s[q + PEAK]
+            if (known and at - last <= nearest) or (s[q + CLOSED] > 0.0 and not _can_pass(s, q)):
+                continue
+            rank += 1.0
+            if rank + s[BOUT_PEAKS] < s[BOUT]:
+                continue  # a reference at most
+            passes = in_force and peak > upper and peak - low >= s[REST] and at - passed > nearest
+            if passes:
+                passed = at
+            waiting.append((at, max(peak - low, 0.0), passes))
+            goes_on = goes_on or at - last < s[MAX_SPACING]
+    if goes_on and known and s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT]:
+        end = HELD + int(s[BOUT_PEAKS]) * ROW
+        return [(s[i + 1], s[i + 3] - s[i + 4], True) for i in range(HELD, end, ROW)] + waiting
+    return waiting
+
+
+def _can_pass(s: State, q: int) -> bool:
+    """Tell whether the peak at queue place `q`, whose thresholds are known, can still pass them."""
+    if s[q + PEAK] <= s[q + UPPER]:
+        return False
+    return s[q + SEEN] < s[VALLEYS] or s[q + VALLEY] < s[q + LOWER]
 
 
 def _peak(s: State, at: float, value: float) -> None:
