@@ -171,33 +171,44 @@ def likely(s: State) -> list[Likely]:
     Those are the held ones of a bout that can still become certain, and all undecided ones that no rule excludes yet.
     One passes if it does by the thresholds of the last window and no other that does lies too near before it.
     """
-    known, last = s[BOUT_PEAKS] > 0.0, s[LAST]
-    goes_on = s[NEXT] - s[HALF] - last < s[MAX_SPACING]
-    waiting: list[Likely] = []
-    if s[COUNT] > 0.0:
-        upper, low = s[HIGH], s[FILTERED]
-        in_force = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
-        if in_force:
-            upper, low = (s[HIGH] + s[LOW]) / 2.0, s[LOW]
-        nearest, passed = s[MIN_SPACING], last if known else -s[MAX_SPACING]
-        head, capacity, rank = int(s[HEAD]), int(s[CAPACITY]), 0.0 if s[CREDIT] == 0.0 else s[BOUT]
-        for i in range(int(s[COUNT])):
-            q = QUEUE + (head + i) % capacity * ENTRY
-            at, peak = s[q + AT], s[q + PEAK]
-            if (known and at - last <= nearest) or (s[q + CLOSED] > 0.0 and not _can_pass(s, q)):
-                continue
-            rank += 1.0
-            if rank + s[BOUT_PEAKS] < s[BOUT]:
-                continue  # a reference at most
-            passes = in_force and peak > upper and peak - low >= s[REST] and at - passed > nearest
-            if passes:
-                passed = at
-            waiting.append((at, max(peak - low, 0.0), passes))
-            goes_on = goes_on or at - last < s[MAX_SPACING]
-    if goes_on and known and s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT]:
-        end = HELD + int(s[BOUT_PEAKS]) * ROW
-        return [(s[i + 1], s[i + 3] - s[i + 4], True) for i in range(HELD, end, ROW)] + waiting
-    return waiting
+    peaks, bout, last = s[BOUT_PEAKS], s[BOUT], s[LAST]
+    uncertain = 0.0 < peaks < bout and s[CREDIT] > 0.0
+    waiting = _waiting(s) if s[COUNT] > 0.0 else []
+    if not uncertain:
+        return waiting
+    first = waiting[0][0] if waiting else s[NEXT] - s[HALF]
+    if min(first, s[NEXT] - s[HALF]) - last >= s[MAX_SPACING]:
+        return waiting
+    held = range(HELD, HELD + int(peaks) * ROW, ROW)
+    return [(s[i + 1], s[i + 3] - s[i + 4], True) for i in held] + waiting
+
+
+def _waiting(s: State) -> list[Likely]:
+    """Return the undecided peaks that no rule excludes yet."""
+    found: list[Likely] = []
+    upper, low, rest = s[HIGH], s[FILTERED], s[REST]
+    in_force = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    if in_force:
+        upper, low = (s[HIGH] + s[LOW]) / 2.0, s[LOW]
+    nearest = s[MIN_SPACING]
+    after = s[LAST] + nearest if s[BOUT_PEAKS] > 0.0 else -1.0
+    sure_after = after
+    short = 0.0 if s[CREDIT] > 0.0 else s[BOUT] - s[BOUT_PEAKS] - 1.0
+    head, capacity = int(s[HEAD]), int(s[CAPACITY])
+    for i in range(int(s[COUNT])):
+        q = QUEUE + (head + i) % capacity * ENTRY
+        at, peak = s[q + AT], s[q + PEAK]
+        if at <= after or (s[q + CLOSED] > 0.0 and not _can_pass(s, q)):
+            continue
+        if short > 0.0:
+            short -= 1.0  # a reference at most
+            continue
+        height = peak - low
+        passes = in_force and peak > upper and height >= rest and at > sure_after
+        if passes:
+            sure_after = at + nearest
+        found.append((at, max(height, 0.0), passes))
+    return found
 
 
 def _can_pass(s: State, q: int) -> bool:

@@ -110,7 +110,7 @@ class KernelCounter:
         likely = self._likely()
         return Update(
             steps=steps,
-            pending=sum(one[2] for one in likely) if kernel.likely else kernel.pending(self._state),
+            pending=sum([one[2] for one in likely]) if kernel.likely else kernel.pending(self._state),
             likely=likely,
             trace_from_s=(block.start - kernel.delay) / GRID_HZ,
             trace=trace,
