@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from service.counters.fusion_ahead import coming_peaks
 from service.counters.fusion_checks import (
     CHANNELS,
     DEPTH,
@@ -163,8 +164,9 @@ def pending(s: State) -> int:
 def likely(s: State) -> list[Likely]:
     """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
-    Those are the held ones of a bout that can still become certain, and the last peak. That passes if it rises by more
-    than rest above its valley, or above the one before as long as its own has not come.
+    Those are the held ones of a bout that can still become certain, the last peak, and those that the filter is about
+    to let out. One passes if it rises by more than rest above its valley, or above the one before as long as its own
+    has not come.
     """
     found: list[Likely] = []
     at, value, valley = s[PEAK_AT], s[PEAK_VALUE], s[VALUE]
@@ -179,6 +181,11 @@ def likely(s: State) -> list[Likely]:
     if waits:
         height = value - valley
         found.append((at, height if 0.0 < height < value else 0.0, height > s[REST]))
+    if s[NEXT] >= 0.0:
+        valley = s[VALUE] if s[KIND] == VALLEY else s[VALLEY_VALUE]
+        for coming, value in coming_peaks(s):
+            passes = s[KIND] == VALLEY and value - valley > s[REST]
+            found.append((coming, value - valley if valley < value else 0.0, passes))
     return found
 
 

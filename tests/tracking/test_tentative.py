@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters.registry import DEFAULT, make
-from service.samples import Packet, Step, StepCounted, Tentative
+from service.samples import DeviceInfo, Packet, RawBlock, Step, StepCounted, Tentative
 from service.tracking.tentative import TentativeSteps
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
@@ -117,3 +117,62 @@ def test_times_say_how_well_they_are_known():
     known = [event.uncertainty_s for event, _ in heard if isinstance(event, Tentative | StepCounted)]
     assert min(known) >= 0.01
     assert max(known) < 0.013  # half a sample, half a tick, and at most one that the grid has not followed yet
+
+
+class NineAxes:
+    """A device that says its rate, then sends blocks of a walk with angular rate and field; the bytes are the index."""
+
+    def __init__(self, sensed):
+        self.sensed = sensed
+
+    def handshake(self):
+        return ()
+
+    def history(self, _):
+        return ()
+
+    def feed(self, characteristic, data):
+        if characteristic == "rate":
+            return DeviceInfo(rate_hz=50.0)
+        first = int(data)
+        cut = [tuple(c.tolist() for c in part[first : first + 10].T) for part in self.sensed]
+        return RawBlock(boot=1, index=first, tick=None, acc_g=cut[0], gyro_rad_s=cut[1], mag_ut=cut[2])
+
+
+def nine_axes(seconds=20, seed=2):
+    sensed = Walker(f"normal:{seconds}", seed=seed).sensed()
+    parts = (sensed.acc_g, sensed.gyro_rad_s, sensed.mag_ut)
+    packets = [Packet(characteristic="data", data=str(k).encode(), at_ns=0) for k in range(0, len(parts[0]), 10)]
+
+    def fresh():
+        return Tracker(NineAxes(parts), {DEFAULT: lambda: make(DEFAULT)}, primary=DEFAULT)
+
+    return fresh, [Packet(characteristic="rate", data=b"", at_ns=0), *packets]
+
+
+def test_steps_of_any_counter_have_a_heading_where_the_sensors_give_one():
+    """The synthetic arm swings along the walker's way, to magnetic north: a line at 0°."""
+    fresh, packets = nine_axes()
+    tracker = fresh()
+    events = [event for packet in packets for event in tracker.apply(packet)]
+    found = {event.step.at_s: event.heading for event in events if isinstance(event, StepCounted)}
+    told = {event.at_s: event.heading for event in events if isinstance(event, Tentative)}
+    late = {at_s: heading for at_s, heading in found.items() if at_s > 3}
+    assert len(late) > 20
+    for heading in late.values():
+        assert heading.is_line
+        assert abs((heading.deg + 90) % 180 - 90) < 8
+        assert 20 < heading.uncertainty_deg < 40
+    assert found.items() <= told.items()
+
+
+def test_the_heading_goes_on_from_a_snapshot():
+    fresh, packets = nine_axes(8)
+    whole, first, second = fresh(), fresh(), fresh()
+    expected = [event for packet in packets for event in whole.apply(packet)]
+    before = [event for packet in packets[:25] for event in first.apply(packet)]
+    second.restore(json.loads(json.dumps(first.snapshot())))
+    second.info = first.info
+    after = [event for packet in packets[25:] for event in second.apply(packet)]
+    assert before + after == expected
+    assert any(event.heading for event in after if isinstance(event, Tentative))
