@@ -118,13 +118,17 @@ def pending(s: State) -> int:
 def likely(s: State) -> list[Likely]:
     """Return crests that can become steps: index, height, and whether the rhythm has them all but certain.
 
-    Those are the steps of a bout that can still become certain, and the highest samples so far of the parts of the
-    period under way, or, while none is locked, the tops that a period found now could take.
+    Those are the steps of a bout that can still become certain, the tops that a period could take, and, while one is
+    locked, the highest samples so far of its parts.
     """
     credit = s[CREDIT] > 0.0
     found: list[Likely] = []
     if credit or s[BOUT_STEPS] + s[N] >= s[BOUT]:
-        found = _expected(s) if s[RHYTHM] > 0.0 else _tops(s)
+        found = _tops(s)
+        if s[RHYTHM] > 0.0:
+            expected = _expected(s)
+            named = {one[0] for one in expected}
+            found = sorted([one for one in found if one[0] not in named] + expected)
     first = found[0][0] if found else s[NEXT] - 1.0
     if credit and s[BOUT_STEPS] < s[BOUT] and min(first, s[NEXT] - 1.0) - s[LAST] <= s[PATIENCE]:
         end = HELD + int(s[BOUT_STEPS]) * ROW
