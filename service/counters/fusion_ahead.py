@@ -1,7 +1,8 @@
 """Peaks of the fusion counter that its filter has not let out yet: known already, since its input waits.
 
 The five filters lag alike because the faster ones' inputs wait for the slowest (`fusion`). What waits is there, so the
-filter in force can be run over it ahead of time: the same values will come out, unless another filter takes over.
+filter in force can be run over it ahead of time: the same values will come out, unless another filter takes over; a
+peak seen coming is then taken back, and told again once it is one.
 """
 
 from __future__ import annotations

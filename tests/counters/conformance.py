@@ -148,10 +148,11 @@ def check_latency(make: Make, signal: Signal) -> None:
             assert k / GRID_HZ - step.at_s <= counter.latency_s + ROUNDING_S
 
 
-def check_told(make: Make, signal: Signal, cuts: Sequence[int], *, within: int | None) -> None:
+def check_told(make: Make, signal: Signal, cuts: Sequence[int], *, within: int | None, anew: bool = False) -> None:
     """Every step was named likely before, `within` samples after its crest ends on the trace, and never taken back.
 
     What is named depends on the samples so far, and not on how they were cut. None: a counter that cannot promise it.
+    With `anew` a step may have been taken back, if it was named again.
     """
     counter = make()
     trace: list[float] = []
@@ -163,7 +164,10 @@ def check_told(make: Make, signal: Signal, cuts: Sequence[int], *, within: int |
         from_s = update.trace_from_s - k / GRID_HZ
         trace += [float(value) for value in update.trace]
         confirmed = {step.at_s for step in update.steps}
-        gone |= {at_s for at_s, *_ in (named[-1] if named else [])} - {at_s for at_s, *_ in update.likely} - confirmed
+        now = {at_s for at_s, *_ in update.likely}
+        gone |= {at_s for at_s, *_ in (named[-1] if named else [])} - now - confirmed
+        if anew:
+            gone -= now
         if within is not None:
             assert confirmed <= set(told)
             assert not confirmed & gone
