@@ -34,8 +34,8 @@ device time, seconds after the device's boot. The live feed is the WebSocket `/a
 devices): a `snapshot` first, then events; `GET /api/v1/live/schema` has the JSON Schema of every message."""
 
 
-def create_app(supervisor: Supervisor) -> FastAPI:
-    """Return the application over `supervisor`, which runs while the application does."""
+def create_app(supervisor: Supervisor, trials: Trials | None = None) -> FastAPI:
+    """Return the application over `supervisor`, which runs while the application does, and over its trials."""
 
     @contextlib.asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -61,7 +61,7 @@ def create_app(supervisor: Supervisor) -> FastAPI:
     add_device_routes(app, supervisor)
     add_counter_routes(app, supervisor)
     add_calibration_routes(app, supervisor)
-    add_trial_routes(app, supervisor, Trials())
+    add_trial_routes(app, supervisor, trials or Trials())
     _add_live(app, supervisor)
     _add_page(app)
     return app

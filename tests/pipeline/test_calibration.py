@@ -28,9 +28,10 @@ class Tape:
         self.blocks = []
         session.observers.append(lambda notice: self.blocks.append(notice.event))
 
-    def joined(self):
+    def joined(self, samples=None):
+        """The first `samples` of them, or all."""
         blocks = [event.block for event in self.blocks if isinstance(event, Gridded)]
-        axes = tuple([value for block in blocks for value in block.acc_g[axis]] for axis in range(3))
+        axes = tuple([value for block in blocks for value in block.acc_g[axis]][:samples] for axis in range(3))
         return SampleBlock(start=blocks[0].start, acc_g=axes)
 
 
