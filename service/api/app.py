@@ -19,6 +19,7 @@ from service.api import models
 from service.api.calibrations import add_calibration_routes
 from service.api.devices import add_counter_routes, add_device_routes
 from service.api.guard import Guard
+from service.api.guide import add_guide
 from service.api.live import serve_feed
 from service.api.trials import add_trial_routes
 from service.config import LOOPBACK
@@ -64,6 +65,7 @@ def create_app(supervisor: Supervisor, trials: Trials | None = None) -> FastAPI:
     add_trial_routes(app, supervisor, trials or Trials())
     _add_live(app, supervisor)
     _add_page(app)
+    add_guide(app)
     return app
 
 
