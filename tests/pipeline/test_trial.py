@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -33,6 +34,10 @@ def step(at_s, counter="c"):
 
 def counting(at_s, pending=0):
     return told(at_s, Counting(now_s=at_s, steps=0, steps_now=pending, cadence_spm=None))
+
+
+def unsure(at_s, uncertainty_s):
+    return replace(counting(at_s), uncertainty_s=uncertainty_s)
 
 
 def gap(to_s, seconds, *, filled=False):
@@ -108,15 +113,17 @@ def test_likely_steps_are_shown_while_they_may_still_count():
 @pytest.mark.parametrize(
     ("notices", "said"),
     [
+        ([told(15, Segmented(primary="c", steps=0))], "parameters were changed after 0 steps"),
         ([gap(15, 2.5)], "samples missing for 2.5 s"),
         ([gap(15, 2.5), gap(18, 1.0)], "samples missing for 3.5 s"),
         ([gap(15, 0.3, filled=True)], "0.30 s of samples bridged"),
+        ([unsure(12, 0.6), unsure(13, 0.1)], "times known to 0.6 s only"),
         ([told(15, Rebooted(boot=2, previous=1))], "started again"),
         (
             [link(15, LinkState.LOST), link(16, LinkState.CONNECTING), link(18, LinkState.STREAMING)],
             "connected for 3.0",
         ),
-        ([step(12), told(15, Segmented(primary="d", steps=1))], "counter changed after 1 steps, to d"),
+        ([step(12), told(15, Segmented(primary="d", steps=1))], "counter changed to d after 1 steps"),
     ],
 )
 def test_what_may_have_cost_steps_is_noted(notices, said):
@@ -124,7 +131,7 @@ def test_what_may_have_cost_steps_is_noted(notices, said):
 
 
 def test_what_was_before_the_trial_is_not_noted():
-    assert played(gap(9.9, 5)).note(0) is None
+    assert played(gap(9.9, 5), unsure(15, 0.2)).note(0) is None
 
 
 def test_what_hurts_the_last_steps_after_the_end_is_noted_too():
@@ -145,7 +152,7 @@ def test_a_device_that_is_away_says_since_when():
 def test_a_device_lost_at_the_end_settles_at_once_and_says_how_many_are_left_out():
     count = played(step(11), counting(14, pending=3), link(15, LinkState.LOST))
     assert count.settled
-    assert "3 likely steps are left out" in count.note(0)
+    assert "likely steps left out: 3" in count.note(0)
     assert "not connected for 5.0 s" in count.note(99 * S)
 
 
