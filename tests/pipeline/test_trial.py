@@ -166,7 +166,12 @@ def test_a_device_lost_while_it_settles_is_settled_and_says_so(state):
 
 def test_another_primary_counts_on_and_its_steps_are_in_the_trial():
     count = begun_at()
-    for notice in (step(11), told(12, Segmented(primary="d", steps=1)), step(13, counter="c"), step(14, counter="d")):
+    for notice in (
+        step(11),
+        told(12, Segmented(primary="d", steps=1)),
+        *map(step, (13, 14, 15)),
+        step(16, counter="d"),
+    ):
         count.take(notice)
     assert count.steps == 2
     ended(count, 20)
