@@ -74,6 +74,11 @@ class Timebase:
         """
         return (0.5 * max(1.0, self._fit.pace) + self._fit.deviation) / GRID_HZ
 
+    @property
+    def fields(self) -> frozenset[str]:
+        """Names of a block's fields that the device sends: its sensors."""
+        return frozenset(self._lanes)
+
     def set_clock(self, index: int, tick: int) -> None:
         """Take the device's full tick at a sample: tells the high bits of the ticks in packets."""
         self._clock = (index, tick)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.counters.contract import StepCounter
+from service.counters.streaming import FIELDS
 from service.errors import CounterError, WireError, WireFault
 from service.samples import (
     GRID_HZ,
@@ -22,11 +23,13 @@ from service.samples import (
     Described,
     DeviceInfo,
     Event,
+    Gridded,
     Likely,
     Packet,
     RawBlock,
     Rebooted,
     Segmented,
+    Sensor,
     Signal,
     Step,
     StepCounted,
@@ -105,6 +108,13 @@ class Tracker:
     def measured_rate_hz(self) -> float | None:
         """The device's sampling rate as its own clock tells it."""
         return self._timebase.measured_rate_hz if self._timebase else None
+
+    @property
+    def sensors(self) -> frozenset[Sensor] | None:
+        """What the device sends; None before its first samples."""
+        if self._timebase is None:
+            return None
+        return frozenset(sensor for sensor, field in FIELDS.items() if field in self._timebase.fields)
 
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
@@ -224,6 +234,7 @@ class Tracker:
             self.tally.samples_lost += gap.samples
             events.append(gap)
         self._heading.update(samples)
+        events.append(Gridded(block=samples))
         pending = 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
             try:
