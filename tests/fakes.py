@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from service.counters.contract import Snapshot
-from service.samples import GRID_HZ, Packet, SampleBlock, Step, Update
+from service.samples import ACCELEROMETER_ONLY, GRID_HZ, Packet, SampleBlock, Step, Update
 from service.wearables import bracelet as wire
 
 EVERY = 25
@@ -14,6 +14,7 @@ class MetronomeCounter:
     """Counts a step at every 25th sample of the grid that it is given; pending while half way to the next."""
 
     name = "metronome"
+    sensors = ACCELEROMETER_ONLY
     latency_s = 0.0
 
     def __init__(self):

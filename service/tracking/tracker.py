@@ -26,6 +26,8 @@ from service.samples import (
     RawBlock,
     Rebooted,
     Segmented,
+    Sensor,
+    Sensors,
     Signal,
     StepCounted,
     Update,
@@ -33,6 +35,7 @@ from service.samples import (
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
 from service.tracking.doubt import Doubt, index_ahead
+from service.tracking.fitness import Stream, faults, too_slow
 from service.tracking.tentative import TentativeSteps
 from service.wearables.contract import Wearable
 
@@ -48,6 +51,7 @@ class Tally:
     packets_duplicate: int = 0
     samples: int = 0
     samples_lost: int = 0
+    samples_saturated: int = 0
     gaps: int = 0
     reboots: int = 0
 
@@ -68,7 +72,10 @@ class Tracker:
         """The device's steps when the primary took over, and the primary's own count then."""
         self.last_fault: WireError | None = None
         self.counter_faults: dict[str, str] = {}
-        """Why a counter does not count, as a sentence: a sensor that the device does not send."""
+        """Why a counter does not count, as a sentence: a sensor that the device does not send, or too low a rate."""
+        self._judged: object = None
+        self._held: Sensors | None = None
+        """What the newest block held."""
         self._wearable = wearable
         self._factories = dict(counters)
         self._counters = {name: make() for name, make in counters.items()}
@@ -130,8 +137,9 @@ class Tracker:
         before = self.total
         self.steps = {name: self.steps[name] if name in kept else 0 for name in counters}
         self._counters = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
-        self.counter_faults = {name: why for name, why in self.counter_faults.items() if name in kept}
         self._factories = dict(counters)
+        self._judged = None
+        self._judge()
         if primary == self.primary and primary in kept:
             return events
         self.primary, self._segment = primary, (before, self.steps[primary])
@@ -169,8 +177,9 @@ class Tracker:
         """Take over a snapshot's state; SnapshotError where its counters are not ours."""
         for uuid, data in state["said"].items():
             self.apply(Packet(characteristic=uuid, data=bytes.fromhex(data), at_ns=0))
-        clock = state["info"]["clock"]
-        self.info = DeviceInfo(**{**state["info"], "clock": clock and (clock[0], clock[1])})
+        info = state["info"]
+        clock, sensors = info["clock"] and tuple(info["clock"]), info["sensors"] and tuple(map(Sensor, info["sensors"]))
+        self.info = DeviceInfo(**{**info, "clock": clock, "sensors": sensors})
         for name, counter in self._counters.items():
             counter.restore(state["counters"][name])
         self.tally = Tally(**state["tally"])
@@ -192,6 +201,7 @@ class Tracker:
         if info == self.info:
             return []
         self.info = info
+        self._judge()
         return [Described(info=info)]
 
     def _receive(self, block: RawBlock) -> list[Event]:
@@ -216,11 +226,14 @@ class Tracker:
         samples, gap = timebase.feed(fresh)
         self._next_index = fresh.index + len(fresh)
         self.tally.samples += len(fresh)
+        self.tally.samples_saturated += len(fresh.saturated)
+        self._held = fresh.sensors
+        self._judge()
         if gap is not None:
             self.tally.gaps += 1
             self.tally.samples_lost += gap.samples
             events.append(gap)
-        pending = 0
+        pending = self.steps_now - self.total if self.primary in self.counter_faults else 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
             try:
                 update = self._counters[name].update(samples)
@@ -235,6 +248,17 @@ class Tracker:
                     events.append(Signal(from_s=update.trace_from_s, values=update.trace, bands=update.bands))
         events.append(self._counting(pending))
         return events
+
+    def _judge(self) -> None:
+        """Find the counters that cannot count what the device has or sends, where that may have changed."""
+        info, rate_hz = self.info, self.info.rate_hz
+        if rate_hz is not None and self._timebase is not None:
+            rate_hz = min(rate_hz, self._timebase.measured_rate_hz)
+        judged = (info.sensors, self._held, rate_hz is not None and too_slow(rate_hz))
+        if judged != self._judged:
+            self._judged = judged
+            stream = Stream(has=info.sensors, holds=self._held, rate_hz=rate_hz)
+            self.counter_faults = faults(self._counters, stream)
 
     def _follow_boot(self, boot: int) -> list[Event]:
         if self._boot == boot:
@@ -271,10 +295,11 @@ class Tracker:
             return None
         # The tick is of the stretch the block began in; what is left of it may begin in the next.
         same_stretch = index // TICK_EVERY == (index + seen) // TICK_EVERY
-        return RawBlock(
-            boot=block.boot,
+        return dataclasses.replace(
+            block,
             index=index + seen,
             tick=block.tick if same_stretch else None,
+            saturated=[at - seen for at in block.saturated if at >= seen],
             acc_g=_cut(block.acc_g, seen),
             gyro_rad_s=_cut(block.gyro_rad_s, seen) if block.gyro_rad_s else None,
             mag_ut=_cut(block.mag_ut, seen) if block.mag_ut else None,
