@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable
 
+from service.counters import registry
 from service.errors import LinkError
 from service.links.ble import Sighting
 from service.links.contract import Link
@@ -52,7 +53,8 @@ class Device:
         return self.wanted and self.state in WAITING and time.monotonic() >= self.not_before_s
 
     def count_with(self, lineup: Lineup) -> None:
-        """Go on with these counters."""
+        """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
+        registry.require_sensors(lineup.primary, self.session.tracker.info.sensors)
         self.lineup = lineup
         self.session.change_counters(lineup)
 

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from device_sim.bracelet import BUFFER_SAMPLES, Bracelet, quantise
 from service.errors import ParameterError
+from service.samples import ACCELEROMETER_ONLY
 from service.wearables import bracelet as wire
 
 
@@ -54,6 +55,8 @@ def test_any_chunks_and_mtus_give_every_sample_once(radio_known, n, chunks, mtus
 @pytest.fixture(scope="module")
 def radio_known():
     class Source:
+        sensors = ACCELEROMETER_ONLY
+
         def __init__(self, n, rate_hz=50.0):
             self.rate_hz = rate_hz
             self.acc_g = np.random.default_rng(n).uniform(-7.9, 7.9, (n, 3))
@@ -105,6 +108,7 @@ def test_a_full_buffer_loses_the_oldest(radio):
 def test_values_beyond_the_range_are_sent_as_its_limit():
     class Shaken:
         rate_hz = 50.0
+        sensors = ACCELEROMETER_ONLY
 
         def read(self, n):
             return np.tile([9.0, -9.0, 1.0], (n, 1))
