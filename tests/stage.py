@@ -56,13 +56,13 @@ def default_tracker(wearable):
 
 
 @contextlib.asynccontextmanager
-async def staged(bracelet, *, durable_limit=1000, wanted=None, beside=(), **radio):
+async def staged(bracelet, *, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), **radio):
     """Run the service over a bracelet on a local air; everything is closed and joined at the end."""
     async with LocalAir() as air, air.bracelet(bracelet, **radio) as gatt, air.central() as central:
         supervisor = Supervisor(
             hub=Hub(durable_limit=durable_limit),
             make_wearable=Protocol,
-            lineup=lineup(DEFAULT, beside=beside),
+            lineup=lineup(counter, beside=beside),
             wanted=wanted,
             backend=Backend(scanner=central.scanner, client=central.client),
         )
