@@ -114,6 +114,8 @@ class Timebase:
 
     def _follow_sensors(self, block: RawBlock) -> None:
         """Forget a sensor that `block` lacks; a new one begins beside the acceleration, at its first value."""
+        if block.gyro_rad_s is None and block.mag_ut is None and len(self._lanes) == 1:
+            return  # nothing to do, and most devices' case
         for name in _SENSORS:
             columns = getattr(block, name)
             if columns is None:

@@ -75,7 +75,8 @@ class Tracker:
         """Why a counter does not count, as a sentence: a sensor that the device does not send, or too low a rate."""
         self._judged: object = None
         self._held: Sensors | None = None
-        """What the newest block held."""
+        self._measured_hz = 0.0
+        """What the newest block held, and the rate after it."""
         self._wearable = wearable
         self._factories = dict(counters)
         self._counters = {name: make() for name, make in counters.items()}
@@ -227,8 +228,9 @@ class Tracker:
         self._next_index = fresh.index + len(fresh)
         self.tally.samples += len(fresh)
         self.tally.samples_saturated += len(fresh.saturated)
-        self._held = fresh.sensors
-        self._judge()
+        if fresh.sensors is not self._held or timebase.measured_rate_hz != self._measured_hz:
+            self._held, self._measured_hz = fresh.sensors, timebase.measured_rate_hz
+            self._judge()
         if gap is not None:
             self.tally.gaps += 1
             self.tally.samples_lost += gap.samples
@@ -251,9 +253,8 @@ class Tracker:
 
     def _judge(self) -> None:
         """Find the counters that cannot count what the device has or sends, where that may have changed."""
-        info, rate_hz = self.info, self.info.rate_hz
-        if rate_hz is not None and self._timebase is not None:
-            rate_hz = min(rate_hz, self._timebase.measured_rate_hz)
+        info, measured_hz = self.info, self.measured_rate_hz
+        rate_hz = info.rate_hz if info.rate_hz is None or measured_hz is None else min(info.rate_hz, measured_hz)
         judged = (info.sensors, self._held, rate_hz is not None and too_slow(rate_hz))
         if judged != self._judged:
             self._judged = judged
@@ -290,7 +291,7 @@ class Tracker:
             index = self._next_index + index_ahead(block.index, self._next_index)
         seen = max(0, self._next_index - index) if self._timebase else 0
         if seen == 0:
-            return dataclasses.replace(block, index=index)
+            return block if index == block.index else dataclasses.replace(block, index=index)
         if seen >= len(block):
             return None
         # The tick is of the stretch the block began in; what is left of it may begin in the next.
