@@ -26,20 +26,21 @@ class Stream:
     holds: Collection[Sensor] | None
     rate_hz: float | None
 
-
-def too_slow(rate_hz: float) -> bool:
-    """Tell whether so many samples a second are too few to tell steps apart."""
-    return rate_hz < _SLOWEST_HZ
+    @property
+    def too_slow(self) -> bool:
+        """Whether there are too few samples a second to tell steps apart."""
+        return self.rate_hz is not None and self.rate_hz < _SLOWEST_HZ
 
 
 def faults(counters: Mapping[str, StepCounter], stream: Stream) -> dict[str, str]:
     """Return why each counter that cannot count `stream` does not, as a sentence."""
-    told = {name: _why_not(name, counter.sensors, stream) for name, counter in counters.items()}
+    told = {name: why_not(name, counter.sensors, stream) for name, counter in counters.items()}
     return {name: why for name, why in told.items() if why is not None}
 
 
-def _why_not(name: str, needed: Collection[Sensor], stream: Stream) -> str | None:
-    if stream.rate_hz is not None and too_slow(stream.rate_hz):
+def why_not(name: str, needed: Collection[Sensor], stream: Stream) -> str | None:
+    """Return why the counter `name`, which needs these sensors, cannot count `stream`; None where it can."""
+    if stream.too_slow:
         return f"{name} needs {MIN_RATE_HZ:g} samples a second or more; the device takes {stream.rate_hz:.3g}"
     has = stream.holds if stream.has is None else stream.has
     if has is not None and (why := lacking(name, needed, has)) is not None:

@@ -22,6 +22,7 @@ from service.samples import (
     Described,
     DeviceInfo,
     Event,
+    Gridded,
     Packet,
     RawBlock,
     Rebooted,
@@ -35,7 +36,7 @@ from service.samples import (
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
 from service.tracking.doubt import Doubt, index_ahead
-from service.tracking.fitness import Stream, faults, too_slow
+from service.tracking.fitness import Stream, faults
 from service.tracking.tentative import TentativeSteps
 from service.wearables.contract import Wearable
 
@@ -109,6 +110,12 @@ class Tracker:
     def measured_rate_hz(self) -> float | None:
         """The device's sampling rate as its own clock tells it."""
         return self._timebase.measured_rate_hz if self._timebase else None
+
+    @property
+    def stream(self) -> Stream:
+        """What is known of what the device sends."""
+        rates = [rate_hz for rate_hz in (self.info.rate_hz, self.measured_rate_hz) if rate_hz is not None]
+        return Stream(has=self.info.sensors, holds=self._held, rate_hz=min(rates, default=None))
 
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
@@ -235,6 +242,7 @@ class Tracker:
             self.tally.gaps += 1
             self.tally.samples_lost += gap.samples
             events.append(gap)
+        events.append(Gridded(block=samples))
         pending = self.steps_now - self.total if self.primary in self.counter_faults else 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
             try:
@@ -253,13 +261,10 @@ class Tracker:
 
     def _judge(self) -> None:
         """Find the counters that cannot count what the device has or sends, where that may have changed."""
-        info, measured_hz = self.info, self.measured_rate_hz
-        rate_hz = info.rate_hz if info.rate_hz is None or measured_hz is None else min(info.rate_hz, measured_hz)
-        judged = (info.sensors, self._held, rate_hz is not None and too_slow(rate_hz))
+        stream = self.stream
+        judged = (stream.has, stream.holds, stream.too_slow)
         if judged != self._judged:
-            self._judged = judged
-            stream = Stream(has=info.sensors, holds=self._held, rate_hz=rate_hz)
-            self.counter_faults = faults(self._counters, stream)
+            self._judged, self.counter_faults = judged, faults(self._counters, stream)
 
     def _follow_boot(self, boot: int) -> list[Event]:
         if self._boot == boot:
