@@ -14,7 +14,8 @@ Run = Callable[..., Any]
 
 IMPORTS = """
 const { Trace } = await import("/web/trace.js");
-const { holes, ticks } = await import("/web/plot.js");
+const { ticks } = await import("/web/axis.js");
+const { holes } = await import("/web/plot.js");
 const { waitMs } = await import("/web/feed.js");
 const { duration, localTime, percent, zone } = await import("/web/format.js");
 """
