@@ -1,4 +1,4 @@
-"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `evaluate`, `bench`.
+"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `evaluate`, `bench`, `counters`.
 
 Ctrl-C or SIGTERM ends each cleanly with exit code 0; a wrong option, file or port ends it with one line and exit code
 2; no Bluetooth with one line and exit code 3; an evaluation without a single count with exit code 1. Nothing heavy is
@@ -217,6 +217,19 @@ async def _bench(options: argparse.Namespace) -> None:
     json_file.write_json(output, figures)
 
 
+async def _counters(options: argparse.Namespace) -> None:
+    """Print the counters, or the parameters of one."""
+    from service.counters import describe  # noqa: PLC0415
+    from service.evaluation.tables import aligned  # noqa: PLC0415
+
+    if options.markdown:
+        print(describe.markdown(), end="")
+    elif options.name is None:
+        print(aligned([describe.OVERVIEW, *describe.overview()], left=4))
+    else:
+        print(aligned([describe.PARAMETERS, *describe.parameters(options.name)], left=6))
+
+
 async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
     from service.api.app import create_app  # noqa: PLC0415
     from service.api.server import address, listen, serve  # noqa: PLC0415
@@ -336,6 +349,9 @@ def _parser() -> argparse.ArgumentParser:
     cli_options.add_evaluation(evaluate)
     bench = _command(commands, "bench", _bench, "measure how fast the counters are")
     cli_options.add_bench(bench)
+    counters = _command(commands, "counters", _counters, "list the counters, or the parameters of one")
+    counters.add_argument("name", metavar="NAME", nargs="?", help="a counter, whose parameters are then listed")
+    counters.add_argument("--markdown", action="store_true", help="print all tables as the guide has them")
     return parser
 
 

@@ -226,4 +226,11 @@ class Counting:
     cadence_spm: float | None
 
 
-Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gridded:
+    """Never published: the grid samples that the counters were given; a Gap before them has been told."""
+
+    block: SampleBlock
+
+
+Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting | Gridded

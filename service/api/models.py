@@ -223,6 +223,9 @@ class CounterModel(BaseModel):
 
     name: str = Field(examples=["double_threshold"])
     sensors: list[str] = Field(examples=[["accelerometer"]])
+    calibrations: list[str] = Field(
+        description="Ways to learn parameters of it from a walk on a device", examples=[["walk", "middle"]]
+    )
     parameters: list[ParameterModel]
 
 

@@ -124,7 +124,9 @@ def step_view(notice: Notice) -> models.StepEvent:
 def counter_view(kind: CounterKind) -> models.CounterModel:
     """Return a counter of the registry with its parameters."""
     parameters = [_parameter_view(field, kind) for field in dataclasses.fields(kind.params)]
-    return models.CounterModel(name=kind.name, sensors=sorted(kind.sensors), parameters=parameters)
+    return models.CounterModel(
+        name=kind.name, sensors=sorted(kind.sensors), calibrations=list(kind.calibrations), parameters=parameters
+    )
 
 
 def _parameter_view(field: dataclasses.Field[Any], kind: CounterKind) -> models.ParameterModel:

@@ -7,9 +7,12 @@ import logging
 import time
 from collections.abc import Callable
 
-from service.errors import LinkError
+from service.counters import registry
+from service.errors import CounterError, LinkError, NotNowError
 from service.links.ble import Sighting
 from service.links.contract import Link
+from service.pipeline.calibration import Calibration, Plan
+from service.pipeline.calibrations import Calibrations
 from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State, advance, backoff_s
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
@@ -31,6 +34,7 @@ class Device:
         self.lineup = lineup
         tracker = Tracker(wearable, lineup.makers, primary=lineup.primary)
         self.session = Session(lambda: self.id, tracker, publish)
+        self.calibrations = Calibrations(self.session)
         self.state = State.SEEN
         self.reason: str | None = None
         self.since_ns = time.time_ns()
@@ -55,6 +59,20 @@ class Device:
         """Go on with these counters."""
         self.lineup = lineup
         self.session.change_counters(lineup)
+
+    def require_streaming(self) -> None:
+        """Raise NotNowError unless the device streams."""
+        if self.state is not State.STREAMING:
+            raise NotNowError(f"{self.id} is {self.state.value}: connect it first, then begin")
+
+    def calibrate(self, plan: Plan) -> Calibration:
+        """Begin a calibration; NotNowError where it cannot be now, CounterError where a sensor is missing."""
+        self.require_streaming()
+        has = self.session.tracker.sensors
+        lacking = [] if has is None else sorted(registry.kind(plan.choice.name).sensors - has)
+        if lacking:
+            raise CounterError(f"{plan.choice.name} needs a {' and a '.join(lacking)}, and the device sends none")
+        return self.calibrations.begin(plan)
 
     def heard(self, sighting: Sighting, *, tell_every_s: float) -> None:
         """Take an advertisement."""

@@ -65,6 +65,11 @@ class Timebase:
         """Device time of the newest sample, in seconds after boot."""
         return self._lanes["acc_g"][grid.PLACE] / GRID_HZ if self._lanes else 0.0
 
+    @property
+    def fields(self) -> frozenset[str]:
+        """Names of a block's fields that the device sends: its sensors."""
+        return frozenset(self._lanes)
+
     def set_clock(self, index: int, tick: int) -> None:
         """Take the device's full tick at a sample: tells the high bits of the ticks in packets."""
         self._clock = (index, tick)

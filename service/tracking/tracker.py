@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.counters.contract import StepCounter
+from service.counters.streaming import FIELDS
 from service.errors import CounterError, WireError, WireFault
 from service.samples import (
     GRID_HZ,
@@ -22,10 +23,12 @@ from service.samples import (
     Described,
     DeviceInfo,
     Event,
+    Gridded,
     Packet,
     RawBlock,
     Rebooted,
     Segmented,
+    Sensor,
     Signal,
     StepCounted,
     Update,
@@ -101,6 +104,13 @@ class Tracker:
     def measured_rate_hz(self) -> float | None:
         """The device's sampling rate as its own clock tells it."""
         return self._timebase.measured_rate_hz if self._timebase else None
+
+    @property
+    def sensors(self) -> frozenset[Sensor] | None:
+        """What the device sends; None before its first samples."""
+        if self._timebase is None:
+            return None
+        return frozenset(sensor for sensor, field in FIELDS.items() if field in self._timebase.fields)
 
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
@@ -220,6 +230,7 @@ class Tracker:
             self.tally.gaps += 1
             self.tally.samples_lost += gap.samples
             events.append(gap)
+        events.append(Gridded(block=samples))
         pending = 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
             try:
