@@ -2,7 +2,7 @@
  * The form that begins a calibration: which one, at which pace, for how many steps or how long.
  */
 
-import { LIMITS, PACES, asked, method } from "./calibration_words.js";
+import { LIMITS, PACES, asked, method, range } from "./calibration_words.js";
 import { el, freshId, setText } from "./dom.js";
 import { words } from "./looks.js";
 
@@ -67,12 +67,12 @@ export class CalibrationForm {
     this.#limit.replaceChildren(...limits.map((limit) => el("option", { value: limit }, LIMITS[limit].noun)));
     if (limits.includes(before)) this.#limit.value = before;
     if (this.#limit.value !== before) this.#usual();
+    setText(this.#range, range(this.#offer.method, this.#limit.value));
   }
 
   #usual() {
-    const { low, usual, high, noun } = LIMITS[this.#limit.value];
-    this.#amount.value = String(usual);
-    setText(this.#range, `${low} to ${high} ${noun}`);
+    this.#amount.value = String(LIMITS[this.#limit.value].usual);
+    setText(this.#range, range(this.#offer.method, this.#limit.value));
   }
 }
 

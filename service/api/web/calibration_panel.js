@@ -7,7 +7,7 @@
 
 import { NO_ANSWER, of, request } from "./api.js";
 import { CalibrationForm } from "./calibration_form.js";
-import { ended, offers, outcome, progress, title } from "./calibration_words.js";
+import { ended, method, offers, outcome, progress, title } from "./calibration_words.js";
 import { el, setText } from "./dom.js";
 import { words } from "./looks.js";
 import { Poll } from "./poll.js";
@@ -102,12 +102,12 @@ export class CalibrationPanel {
     this.#list.replaceChildren(...past.map((group) => this.#group(group)));
   }
 
-  #group({ counter, items }) {
+  #group({ counter, method: kind, items }) {
     const done = items.filter(({ state }) => state === "done");
     const apply = el("button", { type: "button", className: "primary", onclick: () => this.#apply(done) },
       `Apply to ${words(counter)}`);
-    return el("section", { "aria-label": `Calibrations of ${words(counter)}` },
-      el("h3", {}, words(counter)),
+    const head = `${words(counter)}: ${method(kind).title.toLowerCase()}`;
+    return el("section", { "aria-label": head }, el("h3", {}, head),
       el("ul", { className: "plain" }, ...items.map((one) => this.#item(one))),
       done.length ? apply : null);
   }
@@ -117,7 +117,7 @@ export class CalibrationPanel {
       type: "button", className: "quiet", "aria-label": `Forget ${title(one)}, number ${one.number}`,
       onclick: () => this.#forget(one.number),
     }, "Forget");
-    const text = el("span", { className: "said" }, el("b", {}, title(one)), el("span", {}, outcome(one)));
+    const text = el("span", { className: "said" }, el("b", {}, one.pace ?? `Number ${one.number}`), el("span", {}, outcome(one)));
     if (one.state !== "done") return el("li", { className: "failed" }, text, forget);
     const tick = el("input", {
       type: "checkbox", checked: this.#chosen.has(one.number), onchange: () => this.#choose(one.number, tick.checked),

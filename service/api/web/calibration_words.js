@@ -19,6 +19,7 @@ const METHODS = {
     title: "Middle of a recording",
     text: "Walk as you usually do. Of what is recorded, 300 samples from the middle are used.",
     limits: ["seconds"],
+    leastS: 10,
     paced: false,
   },
   slowest_walk: {
@@ -67,6 +68,13 @@ export function progress({ steps, seconds, steps_wanted: stepsWanted, seconds_wa
   return { share, text: `${walked}, ${time}` };
 }
 
+/** Return the words beside the field for a limit: "10 to 1000 steps". */
+export function range(name, limit) {
+  const { low, high, noun } = LIMITS[limit];
+  const { leastS = low } = method(name);
+  return `${limit === "seconds" ? leastS : low} to ${high} ${noun}`;
+}
+
 /** Return what a calibration is called: "Sampling walk, slow". */
 export function title({ method: name, pace }) {
   return [method(name).title, pace].filter(Boolean).join(", ");
@@ -79,9 +87,13 @@ export function outcome({ state, detail, reason, params }) {
   return detail || learnt || UNKNOWN;
 }
 
-/** Return those that have ended, by counter, in the order in which they came: `[{counter, items}]`. */
+/** Return those that have ended, in groups that can be applied together: `[{counter, method, items}]`. */
 export function ended(calibrations) {
-  const past = calibrations.filter(({ state }) => state !== "recording");
-  const names = [...new Set(past.map(({ counter }) => counter))];
-  return names.map((counter) => ({ counter, items: past.filter((one) => one.counter === counter) }));
+  const groups = new Map();
+  for (const one of calibrations.filter(({ state }) => state !== "recording")) {
+    const key = `${one.counter} ${one.method}`;
+    if (!groups.has(key)) groups.set(key, { counter: one.counter, method: one.method, items: [] });
+    groups.get(key).items.push(one);
+  }
+  return [...groups.values()];
 }

@@ -63,8 +63,8 @@ export function consequence(before, after, steps) {
   const known = new Map(before.map((one) => [one.name, one]));
   const said = [];
   if (!same(old, lead)) {
-    const how = old.name === lead.name ? `${words(lead.name)} with other parameters` : words(lead.name);
-    said.push(`A new segment begins: from then on ${how} counts. The count goes on from ${plural(steps, "step")}.`);
+    const how = old.name === lead.name ? "counts with other parameters" : "counts";
+    said.push(`A new segment begins: ${words(lead.name)} ${how}, and the count goes on from ${plural(steps, "step")}.`);
   }
   const fresh = after.slice(1).filter((one) => !known.has(one.name) || !same(known.get(one.name), one));
   const gone = before.filter(({ name }) => !after.some((one) => one.name === name));
