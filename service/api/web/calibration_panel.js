@@ -9,6 +9,7 @@ import { NO_ANSWER, of, request } from "./api.js";
 import { CalibrationForm } from "./calibration_form.js";
 import { ended, method, offers, outcome, progress, title } from "./calibration_words.js";
 import { el, setText } from "./dom.js";
+import { capital } from "./format.js";
 import { words } from "./looks.js";
 import { Poll } from "./poll.js";
 
@@ -150,7 +151,7 @@ export class CalibrationPanel {
       this.#fail("Tick what is to be applied.");
       return;
     }
-    const name = words(done[0].counter);
+    const name = capital(words(done[0].counter));
     if (await this.#change("POST", ["calibrations", "apply"], { numbers })) {
       const primary = this.#device.primary === done[0].counter;
       setText(this.#said, `${name} now uses what was learnt.${primary ? " A new segment begins; the count goes on." : ""}`);

@@ -34,7 +34,7 @@ export class CounterChoice {
     this.#fields = counter.parameters.map((parameter) => new Field(parameter, (text) => this.#type(parameter, text)));
     this.#more = el("details", { className: "params" }, this.#summary,
       el("div", { className: "param-grid" }, ...this.#fields.map(({ element }) => element)));
-    const needs = counter.sensors.some((sensor) => sensor !== USUAL) ? `Needs ${counter.sensors.join(", ")}.` : null;
+    const needs = counter.sensors.some((sensor) => sensor !== USUAL) ? `Needs ${counter.sensors.join(", ")}` : null;
     this.element = el("section", { className: "choice", "data-counter": counter.name, "aria-label": name },
       el("div", { className: "choice-head" },
         el("label", { className: "tick" }, this.#tick, glyph(counter.name), el("span", {}, name)),

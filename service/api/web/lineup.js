@@ -5,7 +5,7 @@
  * always on and the primary is always one of those.
  */
 
-import { plural, whole } from "./format.js";
+import { capital, plural, whole } from "./format.js";
 import { words } from "./looks.js";
 
 /** Return the choice that stands: every counter of `counters`, those of `lineup` ticked. */
@@ -82,8 +82,4 @@ function same(one, other) {
 function listed(choices) {
   const names = choices.map(({ name }) => words(name));
   return names.length < 2 ? names[0] : `${names.slice(0, -1).join(", ")} and ${names.at(-1)}`;
-}
-
-function capital(text) {
-  return text[0].toUpperCase() + text.slice(1);
 }
