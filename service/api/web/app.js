@@ -83,7 +83,7 @@ function showDevices() {
   const entries = devices.all;
   for (const [entry, card] of cards) {
     if (entries.includes(entry)) continue;
-    card.element.remove();
+    card.close();
     cards.delete(entry);
   }
   for (const entry of entries) {

@@ -53,13 +53,11 @@ export class CalibrationPanel {
   }
 
   async #ask() {
-    if (!this.#counters) {
-      const { value, error } = await request("api/v1/counters");
-      if (error) return this.#fail(error);
-      this.#counters = value.items;
-    }
+    this.#counters ??= (await request("api/v1/counters")).value?.items ?? null;
     const { value, error } = await request(of(this.#device, "calibrations"));
-    if (error) return this.#fail(error);
+    if (error || !this.#counters) return this.#unreached(error ?? NO_ANSWER);
+    if (this.#cut) this.#error.hidden = true;
+    this.#cut = false;
     const before = this.#recording.number;
     this.#fill(value.items);
     if (this.#recording.number === null && before !== null) this.#tell(value.items.find(({ number }) => number === before));

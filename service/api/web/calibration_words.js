@@ -3,6 +3,7 @@
  */
 
 import { UNKNOWN, duration, plural, whole } from "./format.js";
+import { fault } from "./lineup.js";
 import { words } from "./looks.js";
 
 export const PACES = ["slow", "normal", "fast", "run"];
@@ -45,9 +46,7 @@ export function method(name) {
 
 /** Return the calibrations that `device` can do, as `{counter, method}`. */
 export function offers(counters, device) {
-  const able = ({ name, sensors }) => !device.counter_faults?.[name]
-    && (!device.sensors || sensors.every((sensor) => device.sensors.includes(sensor)));
-  return counters.filter(able)
+  return counters.filter((counter) => fault(counter, device) === null)
     .flatMap(({ name, calibrations = [] }) => calibrations.map((kind) => ({ counter: name, method: kind })));
 }
 

@@ -77,6 +77,12 @@ export class Card {
     this.#lanes.restyle();
   }
 
+  /** Take the card off the page. */
+  close() {
+    this.#panel.toggle(false);
+    this.element.remove();
+  }
+
   #calibrate() {
     const { calibrate } = this.#fields;
     const open = calibrate.getAttribute("aria-expanded") !== "true";

@@ -78,12 +78,15 @@ class Field {
   #parameter;
   #input;
   #hint;
+  #text = "";
 
   constructor(parameter, onTyped) {
     this.#parameter = parameter;
     const [id, hintId] = [freshId("parameter"), freshId("hint")];
     const { options, low, high, unit, presets } = parameter;
-    const common = { id, "aria-describedby": hintId, onchange: () => onTyped(this.#input.value) };
+    const common = {
+      id, "aria-describedby": hintId, oninput: () => onTyped(this.#input.value), onblur: () => this.#write(),
+    };
     this.#input = options
       ? el("select", common, ...options.map((word) => el("option", { value: word }, word)))
       : el("input", { ...common, type: "text", inputMode: "decimal", autocomplete: "off" });
@@ -95,10 +98,15 @@ class Field {
       this.#hint);
   }
 
+  /** Show the entry's value; what is just being typed stays as it is typed. */
   show(entry) {
-    const text = valueOf(this.#parameter, entry);
-    if (this.#input.value !== text) this.#input.value = text;
+    this.#text = valueOf(this.#parameter, entry);
+    if (document.activeElement !== this.#input) this.#write();
     this.element.classList.toggle("changed", this.#parameter.name in entry.params);
+  }
+
+  #write() {
+    if (this.#input.value !== this.#text) this.#input.value = this.#text;
   }
 
   named(sentence, { params }) {

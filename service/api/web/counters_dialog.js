@@ -7,7 +7,7 @@
 import { of, request } from "./api.js";
 import { CounterChoice } from "./counter_choice.js";
 import { el, setText } from "./dom.js";
-import { changed, consequence, led, standing, ticked, wanted } from "./lineup.js";
+import { changed, consequence, fault, led, standing, ticked, wanted } from "./lineup.js";
 
 export class CountersDialog {
   #dialog;
@@ -49,24 +49,23 @@ export class CountersDialog {
     this.#dialog.showModal();
     const [counters, lineup] = await Promise.all([request("api/v1/counters"), request(of(device, "counters"))]);
     if (this.#device !== device || !this.#dialog.open) return;
-    const fault = counters.error ?? lineup.error;
-    if (fault) this.#list.replaceChildren();
-    if (fault) this.#refuse(fault);
+    const error = counters.error ?? lineup.error;
+    if (error) this.#list.replaceChildren();
+    if (error) this.#refuse(error);
     else this.#fill(counters.value.items, lineup.value.counters);
   }
 
   #fill(counters, lineup) {
     this.#before = lineup;
-    const faults = this.#device.counter_faults ?? {};
-    this.#rows = new Map(counters.map((counter) => [counter.name, this.#row(counter, faults[counter.name])]));
+    this.#rows = new Map(counters.map((counter) => [counter.name, this.#row(counter)]));
     this.#list.replaceChildren(...[...this.#rows.values()].map(({ element }) => element));
     this.#apply.disabled = false;
     this.#set(standing(counters, lineup));
   }
 
-  #row(counter, fault) {
+  #row(counter) {
     const { name } = counter;
-    return new CounterChoice(counter, fault, {
+    return new CounterChoice(counter, fault(counter, this.#device), {
       tick: (on) => this.#set(ticked(this.#choice, name, on)),
       lead: () => this.#set(led(this.#choice, name)),
       change: (change) => this.#set(changed(this.#choice, name, change)),

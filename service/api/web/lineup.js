@@ -8,6 +8,13 @@
 import { capital, plural, whole } from "./format.js";
 import { words } from "./looks.js";
 
+/** Return why a counter cannot count on `device`, as a sentence; null where nothing is known against it. */
+export function fault({ name, sensors }, device) {
+  const lacking = device.sensors ? sensors.filter((sensor) => !device.sensors.includes(sensor)) : [];
+  const missing = lacking.length ? `Needs a ${lacking.join(" and a ")}, which this bracelet does not have.` : null;
+  return device.counter_faults?.[name] ?? missing;
+}
+
 /** Return the choice that stands: every counter of `counters`, those of `lineup` ticked. */
 export function standing(counters, lineup) {
   const running = new Map(lineup.map((choice) => [choice.name, choice]));

@@ -4,6 +4,9 @@
  * While the page is hidden nothing is asked; when it comes back the question is put at once.
  */
 
+/** How long after a task that failed by a fault of the page it is tried again. */
+const AFTER_FAULT_MS = 5_000;
+
 export class Poll {
   #task;
   #timer = 0;
@@ -33,8 +36,12 @@ export class Poll {
   async #run() {
     this.#busy = true;
     this.#again = false;
-    const waitMs = await this.#task();
-    this.#busy = false;
-    if (this.#going) this.#timer = setTimeout(() => this.now(), this.#again ? 0 : waitMs);
+    let waitMs = AFTER_FAULT_MS;
+    try {
+      waitMs = await this.#task();
+    } finally {
+      this.#busy = false;
+      if (this.#going) this.#timer = setTimeout(() => this.now(), this.#again ? 0 : waitMs);
+    }
   }
 }
