@@ -12,7 +12,12 @@ pytestmark = pytest.mark.full
 PATH = "api/v1/devices/SL-0001/calibrations"
 COUNTERS = {
     "items": [
-        {"name": "double_threshold", "sensors": ["accelerometer"], "parameters": [], "calibrations": ["walk", "middle"]},
+        {
+            "name": "double_threshold",
+            "sensors": ["accelerometer"],
+            "parameters": [],
+            "calibrations": ["walk", "middle"],
+        },
         {"name": "gyro_zero_crossing", "sensors": ["gyroscope"], "parameters": [], "calibrations": ["slowest_walk"]},
     ],
     "next": None,
@@ -125,7 +130,9 @@ def test_a_server_that_does_not_answer_is_told_until_it_does(scripted: Scripted)
     server.errors.clear()
 
 
-@pytest.mark.parametrize(("sensors", "offered"), [(["accelerometer"], 2), (["accelerometer", "gyroscope"], 3), (None, 3)])
+@pytest.mark.parametrize(
+    ("sensors", "offered"), [(["accelerometer"], 2), (["accelerometer", "gyroscope"], 3), (None, 3)]
+)
 def test_only_what_the_device_can_do_is_offered(scripted: Scripted, sensors: list[str] | None, offered: int) -> None:
     _, panel = opened(scripted(device(sensors=sensors)))
     expect(panel.get_by_label("Calibration", exact=True).locator("option")).to_have_count(offered)

@@ -63,7 +63,14 @@ def test_whatever_is_ticked_a_lineup_has_its_primary_first_and_each_counter_once
 
 @pytest.mark.parametrize(
     ("text", "params"),
-    [("7", {"bout": 7}), (" 3,5 ", {"bout": 3.5}), ("5", {}), ("", {}), ("many", {"bout": "many"}), ("1e1", {"bout": 10})],
+    [
+        ("7", {"bout": 7}),
+        (" 3,5 ", {"bout": 3.5}),
+        ("5", {}),
+        ("", {}),
+        ("many", {"bout": "many"}),
+        ("1e1", {"bout": 10}),
+    ],
 )
 def test_what_is_typed_is_an_override_unless_it_is_the_presets_own(run: Run, text: str, params: dict[str, Any]) -> None:
     (bout,) = [one for one in COUNTERS[0]["parameters"] if one["name"] == "bout"]
@@ -143,7 +150,12 @@ def row(device: str, percent: float | None, **changes: Any) -> dict[str, Any]:
 
 
 def test_a_trials_rows_have_the_papers_columns(run: Run) -> None:
-    trial = {"number": 3, "name": None, "true_steps": 100, "rows": [row("x", 98.0), row("y", None, error=None, wrist=None)]}
+    trial = {
+        "number": 3,
+        "name": None,
+        "true_steps": 100,
+        "rows": [row("x", 98.0), row("y", None, error=None, wrist=None)],
+    }
     first, second = run("return trial.cells(a, (id) => `name of ${id}`);", trial)
     assert first["accuracy"].replace("\u00a0", " ") == "98.00 %"
     assert (first["device"], first["counter"], first["item"], first["error"]) == (
