@@ -19,6 +19,7 @@ from service.api import models
 from service.api.calibrations import add_calibration_routes
 from service.api.devices import add_counter_routes, add_device_routes
 from service.api.guard import Guard
+from service.api.guide import add_guide
 from service.api.live import serve_feed
 from service.api.trials import add_trial_routes
 from service.config import LOOPBACK
@@ -34,8 +35,8 @@ device time, seconds after the device's boot. The live feed is the WebSocket `/a
 devices): a `snapshot` first, then events; `GET /api/v1/live/schema` has the JSON Schema of every message."""
 
 
-def create_app(supervisor: Supervisor) -> FastAPI:
-    """Return the application over `supervisor`, which runs while the application does."""
+def create_app(supervisor: Supervisor, trials: Trials | None = None) -> FastAPI:
+    """Return the application over `supervisor`, which runs while the application does, and over its trials."""
 
     @contextlib.asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -61,9 +62,10 @@ def create_app(supervisor: Supervisor) -> FastAPI:
     add_device_routes(app, supervisor)
     add_counter_routes(app, supervisor)
     add_calibration_routes(app, supervisor)
-    add_trial_routes(app, supervisor, Trials())
+    add_trial_routes(app, supervisor, trials or Trials())
     _add_live(app, supervisor)
     _add_page(app)
+    add_guide(app)
     return app
 
 

@@ -60,7 +60,7 @@ class CalibrationModel(BaseModel):
     ended_at: datetime | None
     steps: int = Field(description="Steps counted so far", examples=[48])
     seconds: float = Field(description="Device time recorded so far, s", examples=[26.4])
-    params: dict[str, float | str] | None = Field(
+    params: dict[str, int | float | str] | None = Field(
         description="Parameters learnt; null until it is done",
         examples=[{"window_mode": "fixed", "first_window": 27}],
     )

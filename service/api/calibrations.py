@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated, Any
 
 from fastapi import FastAPI, Path
@@ -36,6 +37,7 @@ def add_calibration_routes(app: FastAPI, supervisor: Supervisor) -> None:
             steps=wanted.steps,
             seconds=wanted.seconds,
         )
+        await asyncio.to_thread(plan.way.learner, plan.params)  # the first filter to be designed imports scipy: 1 s
         return _view(device, device.calibrate(plan))
 
     @app.get(_ALL, tags=["calibrations"], responses=_UNKNOWN)

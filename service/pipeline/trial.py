@@ -21,6 +21,9 @@ from service.samples import Counting, Gap, Rebooted, Segmented, StepCounted
 TRUE_STEPS_MAX: Final = 100_000
 """A day's walk and more."""
 
+UNSURE_S: Final = 0.25
+"""Half a step: where arrivals scatter by more, a step may be on the wrong side of an end."""
+
 
 class State(StrEnum):
     """Where a trial stands."""
@@ -78,6 +81,7 @@ class _Harm:
     lost_since_ns: int | None = None
     lost: int = 0
     lost_ns: int = 0
+    unsure_s: float = 0.0
 
     def sentences(self, now_ns: int) -> list[str]:
         lost_ns = self.lost_ns + (now_ns - self.lost_since_ns if self.lost_since_ns is not None else 0)
@@ -86,6 +90,7 @@ class _Harm:
             f"samples missing for {self.gaps_s:.1f} s, no steps counted there": self.gaps,
             f"{self.filled_s:.2f} s of samples bridged by straight lines": self.filled_s,
             "started again, what was being decided then may be lost": self.reboots,
+            f"times known to {self.unsure_s:.1f} s only, steps near either end are uncertain": self.unsure_s > UNSURE_S,
         }
         return [sentence for sentence, happened in said.items() if happened]
 
@@ -125,6 +130,7 @@ class Count:
             case StepCounted(counter=counter) if counter == self._counter:
                 self.steps += self._holds(notice.at_ns)
             case Counting() as counting:
+                self._harm.unsure_s = max(self._harm.unsure_s, notice.uncertainty_s)
                 self._hear(notice.at_ns, counting.steps_now - counting.steps)
             case Gap() as gap:
                 self._note_gap(gap, notice.at_ns)
@@ -163,7 +169,8 @@ class Count:
             self._harm.gaps_s += gap.to_s - gap.from_s
 
     def _change_counter(self, primary: str) -> None:
-        self._remarks.append(f"counter changed after {self.steps} steps, to {primary} or its other parameters")
+        what = "its counter's parameters were changed" if primary == self._counter else f"counter changed to {primary}"
+        self._remarks.append(f"{what} after {self.steps} steps")
         self._counter = primary
         self.settled = self._ended_ns is not None
 
@@ -179,7 +186,7 @@ class Count:
 
     def _settle_unheard(self, why: str) -> None:
         undecided = max(0, self._now - self.steps)
-        self._remarks.append(f"{why}, {undecided} likely steps are left out")
+        self._remarks.append(f"{why}; likely steps left out: {undecided}")
         self.settled = True
 
 

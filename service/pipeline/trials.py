@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 from service.errors import NotNowError, ParameterError, UnknownNumberError
@@ -13,21 +14,31 @@ from service.pipeline.trial import Entry, Finish, State, Trial
 
 KEPT: Final = 1000
 """Trials; policy: no more are begun until some are deleted, for a result may not vanish by itself."""
-
 CLOCK_S: Final = 0.2
-"""A host clock that moved by more against the monotonic one was set: a step may be on the wrong side of the end."""
+"""A host clock that moved by more against the steady one was set: a step may be on the wrong side of the end."""
+
+Listener = Callable[[Notice], None]
+
+
+@dataclass(slots=True, kw_only=True)
+class _Listening:
+    """What a trial that is not done holds on to."""
+
+    offset_ns: int
+    """Host UTC less the steady clock, at the beginning."""
+    listeners: list[tuple[Device, Listener]] = field(default_factory=list)
 
 
 class Trials:
-    """Every trial since the start, by number."""
+    """Every trial since the start, by number. `clock_ns` is host UTC, `steady_ns` a clock that nobody sets."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self, clock_ns: Callable[[], int] = time.time_ns, steady_ns: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        self._clock_ns = clock_ns
+        self._steady_ns = steady_ns
         self._kept: dict[int, Trial] = {}
-        self._devices: dict[int, dict[str, Device]] = {}
-        self._observers: dict[int, dict[str, Callable[[Notice], None]]] = {}
-        """Of those that are not done: the devices, and what listens to their sessions."""
-        self._set_by: dict[int, int] = {}
-        """Host UTC less monotonic time at the beginning: whether somebody set the clock meanwhile."""
+        self._listening: dict[int, _Listening] = {}
         self._last = 0
 
     @property
@@ -43,73 +54,73 @@ class Trials:
 
     def begin(self, devices: Sequence[Device], *, name: str | None, wrists: Mapping[str, str]) -> Trial:
         """Count on these from now on; NotNowError where one does not stream, does not count or walks already."""
-        if len({device.address for device in devices}) != len(devices):
-            raise ParameterError("devices", [device.id for device in devices], "different devices")
+        ids = [device.id for device in devices]
+        if len(set(ids)) != len(ids):
+            raise ParameterError("devices", ids, "different devices, each with an id of its own")
         for device in devices:
             self._check(device)
         if len(self._kept) >= KEPT:
             raise NotNowError(f"{KEPT} trials are kept: delete some first")
         self._last += 1
-        number = self._last
-        entries = [
-            Entry(
-                device=device.id,
-                counter=device.lineup.primary,
-                wrist=wrists.get(device.id, wrists.get(device.address)),
-            )
-            for device in devices
-        ]
-        trial = self._kept[number] = Trial(
-            entries, number=number, name=name or f"trial {number}", began_ns=time.time_ns()
-        )
-        self._set_by[number] = time.time_ns() - time.monotonic_ns()
-        self._devices[number] = {device.id: device for device in devices}
-        self._observers[number] = {}
+        entries = [_entry(device, wrists) for device in devices]
+        name = name or f"trial {self._last}"
+        trial = Trial(entries, number=self._last, name=name, began_ns=self._clock_ns())
+        self._kept[trial.number] = trial
+        self._listening[trial.number] = _Listening(offset_ns=self._offset_ns())
         for device in devices:
             self._listen(trial, device)
         return trial
 
     def finish(self, number: int) -> Trial:
         """End the walk; the counts settle by themselves."""
-        trial = self.get(number)
-        devices = self._devices.get(number, {})
-        moved_s = abs(time.time_ns() - time.monotonic_ns() - self._set_by[number]) / 1e9
-        clock = [f"this computer's clock was set by {moved_s:.1f} s meanwhile"] if moved_s > CLOCK_S else []
-        trial.finish(time.time_ns(), {key: _finish(device, clock) for key, device in devices.items()})
+        trial, listening = self.get(number), self._listening.get(number)
+        at_ns, ends = self._clock_ns(), {}
+        if listening is not None:
+            moved_s = abs(self._offset_ns() - listening.offset_ns) / 1e9
+            remarks = [f"this computer's clock was set by {moved_s:.1f} s meanwhile"] if moved_s > CLOCK_S else []
+            ends = {device.id: _finish(device, remarks) for device, _ in listening.listeners}
+        trial.finish(at_ns, ends)
         if trial.state is State.DONE:
-            self._leave(number)
+            self._leave(trial)
         return trial
 
     def delete(self, number: int) -> None:
         """Drop a trial, whatever its state."""
-        self.get(number)
-        self._leave(number)
-        del self._kept[number], self._set_by[number]
+        self._leave(self.get(number))
+        del self._kept[number]
+
+    def _offset_ns(self) -> int:
+        return self._clock_ns() - self._steady_ns()
 
     def _check(self, device: Device) -> None:
         device.require_streaming()
         tracker = device.session.tracker
         if (fault := tracker.counter_faults.get(tracker.primary)) is not None:
             raise NotNowError(f"{device.id} counts nothing: {fault}; choose another counter for it")
-        for number, devices in self._devices.items():
-            if device in devices.values() and self._kept[number].state is State.WALKING:
-                raise NotNowError(f"{device.id} walks in trial {number}: finish or delete that one first")
+        for trial in self._kept.values():
+            if trial.state is State.WALKING and device.id in trial.counts:
+                raise NotNowError(f"{device.id} walks in trial {trial.number}: finish or delete that one first")
 
     def _listen(self, trial: Trial, device: Device) -> None:
-        key = device.id  # as it is now: a device may tell its id later
+        key = device.id
 
         def hear(notice: Notice) -> None:
             trial.take(key, notice)
             if trial.state is State.DONE:
-                self._leave(trial.number)
+                self._leave(trial)
 
-        self._observers[trial.number][key] = hear
+        self._listening[trial.number].listeners.append((device, hear))
         device.session.observers.append(hear)
 
-    def _leave(self, number: int) -> None:
-        devices, observers = self._devices.pop(number, {}), self._observers.pop(number, {})
-        for key, hear in observers.items():
-            devices[key].session.observers.remove(hear)
+    def _leave(self, trial: Trial) -> None:
+        listening = self._listening.pop(trial.number, None)
+        for device, hear in listening.listeners if listening else ():
+            device.session.observers.remove(hear)
+
+
+def _entry(device: Device, wrists: Mapping[str, str]) -> Entry:
+    wrist = wrists.get(device.id, wrists.get(device.address))
+    return Entry(device=device.id, counter=device.lineup.primary, wrist=wrist)
 
 
 def _finish(device: Device, remarks: Sequence[str]) -> Finish:
