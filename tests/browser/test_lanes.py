@@ -103,6 +103,15 @@ def test_another_primary_marks_the_signal_in_its_own_look_and_the_old_marks_stay
     assert page.locator(".lane").first.get_attribute("data-counter") == "adaptive_peak"
 
 
+def test_the_axis_says_what_the_primarys_signal_is(scripted: Scripted) -> None:
+    for primary, said in (
+        ("fusion", "Filtered acceleration, g"),
+        ("gyro_zero_crossing", "Filtered turning rate, rad/s"),
+    ):
+        page = scripted(device(primary=primary, counters={primary: 1})).open()
+        expect(page.locator("[data-f=axis]")).to_have_text(said)
+
+
 def test_a_counter_that_cannot_count_says_why_instead_of_marks(scripted: Scripted) -> None:
     why = "gyro_zero_crossing needs a gyroscope, and the device sends none"
     faults = {"gyro_zero_crossing": why}

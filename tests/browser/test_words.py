@@ -132,7 +132,7 @@ def test_progress_follows_what_ends_the_walk(run: Run) -> None:
     by_steps = {"steps": 23, "seconds": 12.4, "steps_wanted": 50, "seconds_wanted": None}
     by_time = {"steps": 1, "seconds": 45.0, "steps_wanted": None, "seconds_wanted": 30.0}
     assert run(body, by_steps) == [0.46, "23 of 50 steps, 12 s"]
-    assert run(body, by_time) == [1, "1 step, 45 of 30 s"]
+    assert run(body, by_time) == [1, "1 step, 30 of 30 seconds"]
 
 
 def test_what_ended_stands_together_as_it_can_be_applied(run: Run) -> None:

@@ -17,7 +17,8 @@ export function of(device, ...parts) {
  * server was not reached.
  */
 export async function request(path, { method = "GET", body, timeoutMs = ANSWER_MS } = {}) {
-  const json = body === undefined ? {} : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
+  const headers = { "Content-Type": "application/json" };
+  const json = body === undefined ? {} : { body: JSON.stringify(body), headers };
   try {
     const url = new URL(path, document.baseURI);
     const answer = await fetch(url, { method, signal: AbortSignal.timeout(timeoutMs), ...json });

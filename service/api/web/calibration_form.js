@@ -3,7 +3,7 @@
  */
 
 import { LIMITS, PACES, asked, method, range } from "./calibration_words.js";
-import { el, freshId, setText } from "./dom.js";
+import { el, freshId, labelled, numberField, setText } from "./dom.js";
 import { words } from "./looks.js";
 
 export class CalibrationForm {
@@ -23,9 +23,7 @@ export class CalibrationForm {
     this.#pace.value = "normal";
     this.#which = el("select", { onchange: () => this.#follow() });
     this.#limit = el("select", { onchange: () => this.#usual() });
-    this.#amount = el("input", {
-      type: "text", inputMode: "numeric", autocomplete: "off", "aria-describedby": this.#range.id, className: "short",
-    });
+    this.#amount = numberField({ "aria-describedby": this.#range.id });
     this.#paceRow = labelled("Pace", this.#pace);
     this.element = el("form", { className: "fields", noValidate: true }, this.#text,
       labelled("Calibration", this.#which), this.#paceRow,
@@ -82,12 +80,4 @@ function grouped(offers) {
   return counters.map((counter) => el("optgroup", { label: words(counter) },
     ...offers.flatMap((offer, i) => (offer.counter === counter
       ? [el("option", { value: String(i) }, method(offer.method).title)] : []))));
-}
-
-/** A field under its name. */
-export function labelled(text, field) {
-  const id = field.id || freshId("field");
-  field.id = id;
-  const tag = field.matches("input, select") ? "label" : "span";
-  return el("div", { className: "field" }, el(tag, tag === "label" ? { for: id } : { className: "label" }, text), field);
 }

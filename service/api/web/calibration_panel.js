@@ -1,5 +1,5 @@
 /**
- * Calibrations in a device's card: begin one, watch it, end it early or cancel it, and let a counter use what it learnt.
+ * Calibrations in a device's card: begin one, watch it, end it early or cancel it, let a counter use it.
  *
  * The panel asks the server once a second while something is recorded, else every five seconds, and only while it is
  * open. What is chosen stays where it is when an answer comes.
@@ -8,7 +8,7 @@
 import { NO_ANSWER, of, request } from "./api.js";
 import { CalibrationForm } from "./calibration_form.js";
 import { ended, method, offers, outcome, progress, title } from "./calibration_words.js";
-import { el, setText } from "./dom.js";
+import { button, el, setText } from "./dom.js";
 import { capital } from "./format.js";
 import { words } from "./looks.js";
 import { Poll } from "./poll.js";
@@ -34,7 +34,10 @@ export class CalibrationPanel {
 
   constructor() {
     this.#form = new CalibrationForm((body) => this.#begin(body));
-    this.#recording = new Recording({ finish: (number) => this.#finish(number), cancel: (number) => this.#forget(number) });
+    this.#recording = new Recording({
+      finish: (number) => this.#finish(number),
+      cancel: (number) => this.#forget(number),
+    });
     this.element = el("section", { className: "panel", hidden: true, "aria-label": "Calibrations" },
       this.#none, this.#form.element, this.#recording.element, this.#error, this.#said, this.#list);
     this.#poll = new Poll(() => this.#ask());
@@ -60,7 +63,8 @@ export class CalibrationPanel {
     this.#cut = false;
     const before = this.#recording.number;
     this.#fill(value.items);
-    if (this.#recording.number === null && before !== null) this.#tell(value.items.find(({ number }) => number === before));
+    const hasEnded = before !== null && this.#recording.number === null;
+    if (hasEnded) this.#tell(value.items.find(({ number }) => number === before));
     return this.#recording.number === null ? REST_MS : WATCH_MS;
   }
 
@@ -103,8 +107,7 @@ export class CalibrationPanel {
 
   #group({ counter, method: kind, items }) {
     const done = items.filter(({ state }) => state === "done");
-    const apply = el("button", { type: "button", className: "primary", onclick: () => this.#apply(done) },
-      `Apply to ${words(counter)}`);
+    const apply = button(`Apply to ${words(counter)}`, () => this.#apply(done), { className: "primary" });
     const head = `${words(counter)}: ${method(kind).title.toLowerCase()}`;
     return el("section", { "aria-label": head }, el("h3", {}, head),
       el("ul", { className: "plain" }, ...items.map((one) => this.#item(one))),
@@ -112,11 +115,10 @@ export class CalibrationPanel {
   }
 
   #item(one) {
-    const forget = el("button", {
-      type: "button", className: "quiet", "aria-label": `Forget ${title(one)}, number ${one.number}`,
-      onclick: () => this.#forget(one.number),
-    }, "Forget");
-    const text = el("span", { className: "said" }, el("b", {}, one.pace ?? `Number ${one.number}`), el("span", {}, outcome(one)));
+    const name = `Forget ${title(one)}, number ${one.number}`;
+    const forget = button("Forget", () => this.#forget(one.number), { className: "quiet", "aria-label": name });
+    const head = el("b", {}, one.pace ?? `Number ${one.number}`);
+    const text = el("span", { className: "said" }, head, el("span", {}, outcome(one)));
     if (one.state !== "done") return el("li", { className: "failed" }, text, forget);
     const tick = el("input", {
       type: "checkbox", checked: this.#chosen.has(one.number), onchange: () => this.#choose(one.number, tick.checked),
@@ -151,8 +153,9 @@ export class CalibrationPanel {
     }
     const name = capital(words(done[0].counter));
     if (await this.#change("POST", ["calibrations", "apply"], { numbers })) {
-      const primary = this.#device.primary === done[0].counter;
-      setText(this.#said, `${name} now uses what was learnt.${primary ? " A new segment begins; the count goes on." : ""}`);
+      const leads = this.#device.primary === done[0].counter;
+      const segment = leads ? " A new segment begins; the count goes on." : "";
+      setText(this.#said, `${name} now uses what was learnt.${segment}`);
       this.#said.hidden = false;
     }
   }
@@ -179,8 +182,7 @@ class Recording {
     this.element = el("section", { className: "recording", hidden: true, "aria-label": "Calibration that is recorded" },
       el("p", { className: "told" }, this.#title, this.#text), this.#bar,
       el("div", { className: "tools" },
-        el("button", { type: "button", onclick: () => finish(this.number) }, "Finish early"),
-        el("button", { type: "button", onclick: () => cancel(this.number) }, "Cancel")));
+        button("Finish early", () => finish(this.number)), button("Cancel", () => cancel(this.number))));
   }
 
   show(one) {

@@ -63,7 +63,8 @@ export function progress({ steps, seconds, steps_wanted: stepsWanted, seconds_wa
   const [done, of] = stepsWanted == null ? [seconds, secondsWanted] : [steps, stepsWanted];
   const share = of ? Math.min(1, done / of) : 0;
   const walked = stepsWanted == null ? plural(steps ?? 0, "step") : `${whole(steps)} of ${plural(stepsWanted, "step")}`;
-  const time = secondsWanted == null ? duration(seconds ?? 0) : `${whole(Math.floor(seconds))} of ${duration(secondsWanted)}`;
+  const time = secondsWanted == null ? duration(seconds ?? 0)
+    : `${whole(Math.min(Math.floor(seconds), secondsWanted))} of ${plural(secondsWanted, "second")}`;
   return { share, text: `${walked}, ${time}` };
 }
 

@@ -27,3 +27,21 @@ export function freshId(stem) {
   made += 1;
   return `${stem}-${made}`;
 }
+
+/** Return a field under its name. */
+export function labelled(text, field) {
+  field.id ||= freshId("field");
+  const isControl = field.matches("input, select");
+  const name = isControl ? el("label", { for: field.id }, text) : el("span", { className: "label" }, text);
+  return el("div", { className: "field" }, name, field);
+}
+
+/** Return a field for a whole number; what is typed goes to the server as it is, which alone says what is wrong. */
+export function numberField(props = {}) {
+  return el("input", { type: "text", inputMode: "numeric", autocomplete: "off", className: "short", ...props });
+}
+
+/** Return a button that does `onclick`. */
+export function button(text, onclick, props = {}) {
+  return el("button", { type: "button", onclick, ...props }, text);
+}

@@ -108,8 +108,12 @@ class Lane {
     if (edge === null) return;
     const paint = { colour: colours[look(this.#name).colour], ground: colours.card };
     const shown = ({ atS }) => atS >= fromS && atS <= edge;
-    const shape = ({ atS }) => outline(this.#name, x(atS), y, RADIUS);
-    for (const one of likely.filter(shown)) paintLikely(c, shape(one), { ...paint, alpha: presence(one, nowMs, motion) });
-    for (const one of steps.filter(shown)) paintCounted(c, shape(one), { ...paint, alpha: presence(one, nowMs, motion) });
+    for (const one of [...likely, ...steps].filter(shown)) {
+      const shape = outline(this.#name, x(one.atS), y, RADIUS);
+      const alpha = presence(one, nowMs, motion);
+      if (likely.includes(one)) paintLikely(c, shape, { ...paint, alpha });
+      else if (one.wasLikely && alpha < 1) paintLikely(c, shape, paint);
+      if (!likely.includes(one)) paintCounted(c, shape, { ...paint, alpha });
+    }
   }
 }

@@ -82,7 +82,8 @@ export class Trace {
   addTentative({ status, device_s }, nowMs, counter) {
     const known = this.likely.find(({ atS, goneMs }) => goneMs === null && Math.abs(atS - device_s) <= SAME_S);
     if (status === "retracted" && known) known.goneMs = nowMs;
-    if (status === "likely" && !known) this.likely.push({ counter, atS: device_s, peak: null, bornMs: nowMs, goneMs: null });
+    if (status !== "likely" || known) return;
+    this.likely.push({ counter, atS: device_s, peak: null, bornMs: nowMs, goneMs: null });
   }
 
   /** Take a "gap": `filled` ones were interpolated and are drawn as signal. */

@@ -2,7 +2,8 @@
  * The table of finished trials, in the columns of Wang 2018's Table 4, with means, true steps to enter, and deleting.
  */
 
-import { el, setText } from "./dom.js";
+import { button, el, numberField, setText } from "./dom.js";
+import { plural } from "./format.js";
 import { COLUMNS, cells, means, trueSteps } from "./trial_words.js";
 
 /** How long a first press of Delete waits for the second. */
@@ -18,13 +19,16 @@ export class TrialTable {
   /** `tell` has `truth(number, steps)` and `remove(number)`. */
   constructor(tell) {
     this.#tell = tell;
-    const heads = COLUMNS.map(({ title, number }) => el("th", { scope: "col", className: number ? "number" : "" }, title));
-    heads.push(el("th", { scope: "col" }, el("span", { className: "unseen" }, "Delete")));
+    const heads = COLUMNS.map(({ title, number }) => (
+      el("th", { role: "columnheader", scope: "col", className: number ? "number" : "" }, title)));
+    heads.push(el("th", { role: "columnheader", scope: "col" }, el("span", { className: "unseen" }, "Delete")));
     // Roles are said in full: on a narrow screen the style sheet lays rows out as blocks, which would lose them.
-    const table = el("table", { role: "table" }, el("caption", {}, "Finished trials"), el("thead", {}, el("tr", {}, ...heads)), this.#body);
-    const csv = el("a", { href: "api/v1/trials/table.csv", download: "trials.csv", className: "button" }, "Download as CSV");
+    const table = el("table", { role: "table" },
+      el("caption", {}, "Finished trials"), el("thead", {}, el("tr", {}, ...heads)), this.#body);
+    const csv = el("a", { href: "api/v1/trials/table.csv", download: "trials.csv" }, "Download as CSV");
+    csv.className = "button";
     this.element = el("section", { className: "finished", hidden: true, "aria-label": "Finished trials" },
-      el("div", { className: "sideways", tabIndex: 0, role: "region", "aria-label": "Table of finished trials" }, table),
+      el("div", { className: "sideways", tabIndex: 0, role: "region", "aria-label": "Table of trials" }, table),
       el("h3", {}, "Mean accuracy"), this.#means, csv);
   }
 
@@ -38,9 +42,9 @@ export class TrialTable {
     this.#body.replaceChildren(...trials.flatMap((trial) => this.#rows(trial, name)));
     if (held) this.#body.querySelector(`[aria-label="${CSS.escape(held)}"]`)?.focus();
     const mean = means(trials, name);
-    this.#means.replaceChildren(...mean.map(({ title, text, rows }) => (
-      el("li", {}, el("span", {}, title), el("b", {}, text), el("small", {}, `${rows} ${rows === 1 ? "row" : "rows"}`)))));
-    if (mean.length === 0) this.#means.replaceChildren(el("li", { className: "hint" }, "Enter the true steps to see it."));
+    this.#means.replaceChildren(...mean.map(({ title, text, rows: count }) => (
+      el("li", {}, el("span", {}, title), el("b", {}, text), el("small", {}, plural(count, "row"))))));
+    if (mean.length === 0) this.#means.append(el("li", { className: "hint" }, "Enter the true steps to see it."));
   }
 
   get #isEdited() {
@@ -53,7 +57,8 @@ export class TrialTable {
       const own = COLUMNS.map((column) => this.#cell(trial, row, column, i === 0));
       const remove = el("td", { role: "cell", className: "last" }, i === 0 ? this.#remove(trial, row.item) : null);
       const doubt = el("tr", { role: "row", className: "doubt" }, el("td", { role: "cell", colspan: "9" }, row.note));
-      return [el("tr", { role: "row", className: i === 0 ? "first" : "" }, ...own, remove), ...(row.note ? [doubt] : [])];
+      const line = el("tr", { role: "row", className: i === 0 ? "first" : "" }, ...own, remove);
+      return row.note ? [line, doubt] : [line];
     });
   }
 
@@ -65,8 +70,8 @@ export class TrialTable {
 
   #truth(trial, { item }) {
     const before = trial.true_steps == null ? "" : String(trial.true_steps);
-    const field = el("input", {
-      type: "text", inputMode: "numeric", autocomplete: "off", defaultValue: before, placeholder: "?", className: "short",
+    const field = numberField({
+      defaultValue: before, placeholder: "?",
       "aria-label": `True steps of ${item}`,
       onchange: () => this.#enter(trial.number, field),
       onkeydown: (event) => event.key === "Enter" && field.blur(),
@@ -82,21 +87,21 @@ export class TrialTable {
   /** Deleting takes two presses; the button says so in between. */
   #remove({ number }, item) {
     let sure = false;
-    const button = el("button", { type: "button", className: "quiet", "aria-label": `Delete ${item}`, onclick: () => {
-      if (sure) {
-        button.blur();
-        this.#tell.remove(number);
-        return;
-      }
+    const say = (text, name) => {
+      setText(remove, text);
+      remove.setAttribute("aria-label", name);
+    };
+    const unsure = () => {
+      sure = false;
+      say("Delete", `Delete ${item}`);
+    };
+    const press = () => {
+      if (sure) return this.#tell.remove(number);
       sure = true;
-      setText(button, "Sure?");
-      button.setAttribute("aria-label", `Press again to delete ${item}`);
-      setTimeout(() => {
-        sure = false;
-        setText(button, "Delete");
-        button.setAttribute("aria-label", `Delete ${item}`);
-      }, SURE_MS);
-    } }, "Delete");
-    return button;
+      say("Sure?", `Press again to delete ${item}`);
+      return setTimeout(unsure, SURE_MS);
+    };
+    const remove = button("Delete", press, { className: "quiet", "aria-label": `Delete ${item}` });
+    return remove;
   }
 }

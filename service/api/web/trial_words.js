@@ -55,7 +55,7 @@ export function meanAccuracy(trials, keep = () => true) {
 /** Return the mean accuracy of each device with its counter, and of all, as `{title, text}`. */
 export function means(trials, name) {
   const rows = trials.flatMap((trial) => trial.rows);
-  const kinds = new Map(rows.map(({ device, wrist, counter }) => [[device, wrist, counter].join("\n"), { device, wrist, counter }]));
+  const kinds = new Map(rows.map((row) => [[row.device, row.wrist, row.counter].join("\n"), row]));
   const each = [...kinds.values()].map(({ device, wrist, counter }) => {
     const same = (row) => row.device === device && row.wrist === wrist && row.counter === counter;
     const where = [name(device), wrist, words(counter)].filter(Boolean).join(", ");

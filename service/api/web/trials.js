@@ -6,21 +6,18 @@
  */
 
 import { request } from "./api.js";
-import { labelled } from "./calibration_form.js";
-import { el, freshId, setText } from "./dom.js";
-import { whole } from "./format.js";
+import { el, setText } from "./dom.js";
 import { Poll } from "./poll.js";
+import { TrialForm } from "./trial_form.js";
+import { TrialRun } from "./trial_run.js";
 import { TrialTable } from "./trial_table.js";
-import { standing, trueSteps } from "./trial_words.js";
 
 const WATCH_MS = 1_000;
 const REST_MS = 5_000;
-const ITEMS = ["slow walk", "normal walk", "fast walk", "run", "upstairs", "downstairs"];
-const WRISTS = ["left", "right"];
 
 export class Trials {
   #root;
-  #start = new StartForm((body) => this.#change("POST", "api/v1/trials", body));
+  #start = new TrialForm((body) => this.#change("POST", "api/v1/trials", body));
   #running = el("div", { className: "runs" });
   #cards = new Map();
   #table;
@@ -83,8 +80,11 @@ export class Trials {
 
   #card(number) {
     if (!this.#cards.has(number)) {
-      const finish = (steps) => this.#change("POST", `api/v1/trials/${number}/finish`, steps === null ? {} : { true_steps: steps });
-      const card = new RunningTrial({ finish, cancel: () => this.#change("DELETE", `api/v1/trials/${number}`) });
+      const path = `api/v1/trials/${number}`;
+      const card = new TrialRun({
+        finish: (steps) => this.#change("POST", `${path}/finish`, steps === null ? {} : { true_steps: steps }),
+        cancel: () => this.#change("DELETE", path),
+      });
       this.#cards.set(number, card);
       this.#running.append(card.element);
     }
@@ -108,90 +108,5 @@ export class Trials {
     const { error } = await request(path, { method, body });
     if (error) this.#fail(error);
     this.#poll.now();
-  }
-}
-
-/** Which two devices, on which wrists, and what is tested. */
-class StartForm {
-  element;
-  #sides;
-  #item;
-  #shown = "";
-
-  constructor(start) {
-    const list = el("datalist", { id: freshId("items") }, ...ITEMS.map((value) => el("option", { value })));
-    this.#sides = ["First", "Second"].map((which, i) => {
-      const device = el("select");
-      const wrist = el("select", {}, ...WRISTS.map((side) => el("option", { value: side }, side)));
-      wrist.value = WRISTS[i];
-      return { device, wrist, rows: [labelled(`${which} bracelet`, device), labelled("Wrist", wrist)] };
-    });
-    this.#item = el("input", { type: "text", list: list.id, autocomplete: "off", maxLength: 80, placeholder: ITEMS[1] });
-    this.element = el("form", { className: "fields", noValidate: true },
-      ...this.#sides.map(({ rows }) => el("div", { className: "pair" }, ...rows)),
-      labelled("Test item", this.#item), list, el("button", { type: "submit", className: "primary" }, "Start the trial"));
-    this.element.addEventListener("submit", (event) => {
-      event.preventDefault();
-      start(this.#body());
-    });
-  }
-
-  /** Offer the devices; what is chosen stays. Nothing is offered while fewer than two are free. */
-  show(devices, busy) {
-    const shown = JSON.stringify(devices.map(({ id, name }) => [id, name]));
-    this.element.hidden = devices.filter(({ id }) => !busy.has(id)).length < 2;
-    if (shown === this.#shown) return;
-    this.#shown = shown;
-    this.#sides.forEach(({ device }, i) => {
-      const before = device.value;
-      device.replaceChildren(...devices.map(({ id, name }) => el("option", { value: id }, [name, id].filter(Boolean).join(" · "))));
-      const stays = devices.some(({ id }) => id === before);
-      device.value = stays ? before : devices[Math.min(i, devices.length - 1)]?.id ?? "";
-    });
-  }
-
-  #body() {
-    const wrists = Object.fromEntries(this.#sides.map(({ device, wrist }) => [device.value, wrist.value]));
-    const name = this.#item.value.trim();
-    return { devices: this.#sides.map(({ device }) => device.value), wrists, ...(name ? { name } : {}) };
-  }
-}
-
-/** A trial that is walked: both counts beside each other, and the field for the true one. */
-class RunningTrial {
-  element;
-  #title = el("h3");
-  #state = el("p", { className: "hint", role: "status" });
-  #sides = el("div", { className: "versus" });
-  #truth;
-  #form;
-
-  constructor({ finish, cancel }) {
-    this.#truth = el("input", {
-      type: "text", inputMode: "numeric", autocomplete: "off", className: "short", placeholder: "counted",
-    });
-    this.#form = el("form", { className: "fields", noValidate: true }, labelled("True steps (may come later)", this.#truth),
-      el("button", { type: "submit", className: "primary" }, "Finish"),
-      el("button", { type: "button", onclick: cancel }, "Cancel the trial"));
-    this.#form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      finish(trueSteps(this.#truth.value));
-    });
-    this.element = el("section", { className: "run", "aria-label": "Running trial" }, this.#title, this.#state, this.#sides, this.#form);
-  }
-
-  show(trial, name) {
-    setText(this.#title, trial.name || `Trial ${trial.number}`);
-    setText(this.#state, standing(trial));
-    this.#form.hidden = trial.state !== "walking";
-    if (this.#sides.children.length !== trial.rows.length) {
-      this.#sides.replaceChildren(...trial.rows.map(() => el("p", {}, el("span"), el("strong"), el("small"))));
-    }
-    trial.rows.forEach((row, i) => {
-      const [who, count, note] = this.#sides.children[i].children;
-      setText(who, [name(row.device), row.wrist].filter(Boolean).join(", "));
-      setText(count, whole(row.steps_now ?? row.steps));
-      setText(note, row.note || "");
-    });
   }
 }
