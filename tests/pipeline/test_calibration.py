@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+from counters.test_learning import SLOW_THIGH, pieces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pipeline.stand import Stand
 
+from service.counters import gyro_zero_crossing
 from service.counters.double_threshold import TUNED, middle_window, sampled_window
 from service.errors import CounterError, NotNowError, ParameterError, UnknownNumberError
 from service.pipeline import calibrations
@@ -61,6 +65,23 @@ def test_a_timed_one_ends_by_device_time(method, offline):
     assert done.state is State.DONE
     assert 15 <= done.seconds <= 15.2
     assert done.lesson.params["first_window"] == offline(samples, TUNED)
+
+
+def test_the_slowest_walk_teaches_both_thresholds(monkeypatch):
+    monkeypatch.setattr("service.counters.streaming.compiled", lambda kernel: kernel)  # compiling takes seconds
+    choice = CounterChoice(name="gyro_zero_crossing", preset="paper", overrides={"margin": 0.6})
+    begun = Calibration(Plan(choice=choice, method="slowest_walk", steps=12), number=1, began_ns=0)
+    taken = []
+    for block in pieces(SLOW_THIGH, [10]):
+        if begun.state is State.RECORDING:
+            begun.take(told(Gridded(block=block)))
+            taken.append(len(block))
+    assert begun.state is State.DONE
+    assert begun.steps >= 12
+    assert sum(taken) < len(SLOW_THIGH)
+    walked = next(pieces(SLOW_THIGH, [sum(taken)]))
+    offline = gyro_zero_crossing.calibrated(walked, replace(gyro_zero_crossing.PAPER, margin=0.6))
+    assert begun.lesson.params == {"peak_rad_s": offline.peak_rad_s, "valley_rad_s": offline.valley_rad_s}
 
 
 def test_progress_is_visible_and_it_can_be_ended_early():

@@ -166,7 +166,12 @@ def test_a_device_lost_while_it_settles_is_settled_and_says_so(state):
 
 def test_another_primary_counts_on_and_its_steps_are_in_the_trial():
     count = begun_at()
-    for notice in (step(11), told(12, Segmented(primary="d", steps=1)), step(13, counter="c"), step(14, counter="d")):
+    for notice in (
+        step(11),
+        told(12, Segmented(primary="d", steps=1)),
+        *map(step, (13, 14, 15)),
+        step(16, counter="d"),
+    ):
         count.take(notice)
     assert count.steps == 2
     ended(count, 20)
@@ -417,7 +422,9 @@ def test_a_trial_is_begun_only_where_it_can_be_counted(monkeypatch):
 def test_a_counter_that_cannot_count_is_refused_and_one_that_comes_later_is_noted():
     lab = Lab("normal:60")
     trial = lab.begin()
-    lab.devices[0].count_with(lineup("gyro_zero_crossing"))
+    first = lab.devices[0]
+    first.lineup = lineup("gyro_zero_crossing")
+    first.session.change_counters(first.lineup)  # as if nobody knew yet what the device sends
     lab.walk(2)
     lab.trials.finish(trial.number)
     assert "gyroscope" in trial.counts["sim-1"].note(0)
