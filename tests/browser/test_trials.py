@@ -63,8 +63,10 @@ def test_a_trial_is_begun_with_two_devices_wrists_and_an_item(scripted: Scripted
     _, panel = opened(server)
     panel.get_by_label("First bracelet").select_option("SL-0002")
     panel.get_by_label("Second bracelet").select_option("SL-0001")
-    panel.get_by_label("Wrist").first.select_option("right")
-    panel.get_by_label("Wrist").last.select_option("left")
+    expect(panel.get_by_label("Wrist").first).to_have_value("right")
+    expect(panel.get_by_label("Wrist").last).to_have_value("left")
+    panel.get_by_label("Wrist").first.select_option("left")
+    panel.get_by_label("Wrist").last.select_option("right")
     panel.get_by_label("Test item").fill("fast walk")
     server.api[f"GET {PATH}"] = listing(trial(1, name="fast walk"))
     panel.get_by_role("button", name="Start the trial").click()
@@ -72,7 +74,7 @@ def test_a_trial_is_begun_with_two_devices_wrists_and_an_item(scripted: Scripted
     expect(run.locator(".versus strong")).to_have_text(["129", "132"])
     expect(run).to_contain_text("Left wrist, left")
     expect(panel.get_by_role("button", name="Start the trial")).to_be_hidden()
-    body = {"devices": ["SL-0002", "SL-0001"], "wrists": {"SL-0002": "right", "SL-0001": "left"}, "name": "fast walk"}
+    body = {"devices": ["SL-0002", "SL-0001"], "wrists": {"SL-0002": "left", "SL-0001": "right"}, "name": "fast walk"}
     assert server.asked == [(f"POST {PATH}", body)]
 
 

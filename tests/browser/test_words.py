@@ -171,6 +171,13 @@ def test_mean_accuracies_leave_out_what_is_not_known(run: Run) -> None:
     assert run(body, [{"rows": [row("x", None)]}]) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "wrist"), [("Left", "left"), ("my right wrist", "right"), ("Brightly", None), (None, None)]
+)
+def test_a_devices_name_may_tell_its_wrist(run: Run, name: str | None, wrist: str | None) -> None:
+    assert run("return trial.wristOf({ name: a });", name) == wrist
+
+
 @pytest.mark.parametrize(("text", "steps"), [("1,234", 1234), (" 12 ", 12), ("", None), ("ten", "ten")])
 def test_true_steps_are_read_as_people_write_them(run: Run, text: str, steps: object) -> None:
     assert run("return trial.trueSteps(a);", text) == steps

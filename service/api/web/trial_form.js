@@ -3,6 +3,7 @@
  */
 
 import { el, freshId, labelled } from "./dom.js";
+import { wristOf } from "./trial_words.js";
 
 /** Test items to choose from; any other may be typed. */
 const ITEMS = ["slow walk", "normal walk", "fast walk", "run", "upstairs", "downstairs"];
@@ -12,13 +13,14 @@ export class TrialForm {
   element;
   #sides;
   #item;
+  #devices = [];
   #shown = "";
 
   /** `start(body)` is called with what to ask the server for. */
   constructor(start) {
     const list = el("datalist", { id: freshId("items") }, ...ITEMS.map((value) => el("option", { value })));
     this.#sides = ["First", "Second"].map((which, i) => {
-      const device = el("select");
+      const device = el("select", { onchange: () => this.#guess(i) });
       const wrist = el("select", {}, ...WRISTS.map((side) => el("option", { value: side }, side)));
       wrist.value = WRISTS[i];
       return { device, wrist, rows: [labelled(`${which} bracelet`, device), labelled("Wrist", wrist)] };
@@ -41,13 +43,22 @@ export class TrialForm {
     this.element.hidden = devices.filter(({ id }) => !busy.has(id)).length < 2;
     if (shown === this.#shown) return;
     this.#shown = shown;
+    this.#devices = devices;
     this.#sides.forEach(({ device }, i) => {
       const before = device.value;
       const options = devices.map(({ id, name }) => el("option", { value: id }, name ? `${name} · ${id}` : id));
       device.replaceChildren(...options);
       const stays = devices.some(({ id }) => id === before);
       device.value = stays ? before : devices[Math.min(i, devices.length - 1)]?.id ?? "";
+      if (!stays) this.#guess(i);
     });
+  }
+
+  /** Choose the wrist that the device's name tells of. */
+  #guess(i) {
+    const { device, wrist } = this.#sides[i];
+    const known = this.#devices.find(({ id }) => id === device.value);
+    wrist.value = (known && wristOf(known)) ?? wrist.value;
   }
 
   #body() {

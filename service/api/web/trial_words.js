@@ -73,6 +73,11 @@ export function trueSteps(text) {
   return Number.isNaN(Number(plain)) ? text : Number(plain);
 }
 
+/** Return the wrist that a device's name tells of, "left" or "right"; null where it tells of none. */
+export function wristOf({ name }) {
+  return /\b(left|right)\b/i.exec(name ?? "")?.[1].toLowerCase() ?? null;
+}
+
 /** Return what a trial that is not done waits for. */
 export function standing({ state }) {
   return state === "settling" ? "Deciding the last steps…" : "Walk now: both count.";
