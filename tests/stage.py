@@ -60,7 +60,7 @@ def default_tracker(wearable):
 
 
 @contextlib.asynccontextmanager
-async def staged(bracelet, *others, durable_limit=1000, wanted=None, beside=(), **radio):
+async def staged(bracelet, *others, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), **radio):
     """Run the service over bracelets on a local air; everything is closed and joined at the end."""
     async with contextlib.AsyncExitStack() as stack:
         air = await stack.enter_async_context(LocalAir())
@@ -69,7 +69,7 @@ async def staged(bracelet, *others, durable_limit=1000, wanted=None, beside=(), 
         supervisor = Supervisor(
             hub=Hub(durable_limit=durable_limit),
             make_wearable=Protocol,
-            lineup=lineup(DEFAULT, beside=beside),
+            lineup=lineup(counter, beside=beside),
             wanted=wanted,
             backend=Backend(scanner=central.scanner, client=central.client),
         )

@@ -19,7 +19,7 @@ from service.counters import (
     gyro_zero_crossing,
     plus_minus,
 )
-from service.counters.contract import StepCounter, with_overrides
+from service.counters.contract import StepCounter, lacking, with_overrides
 from service.counters.learning import MIDDLE, SLOWEST_WALK, WALK, Method
 from service.errors import CounterError
 from service.samples import Sensor
@@ -130,6 +130,13 @@ def parameters(name: str, preset: str = "tuned", overrides: Mapping[str, object]
     return with_overrides(presets[preset], overrides or {})
 
 
+def require_sensors(name: str, sensors: Collection[Sensor] | None) -> None:
+    """Raise CounterError where a device with `sensors` lacks what the counter needs; None: nobody knows yet."""
+    why = None if sensors is None else lacking(name, kind(name).sensors, sensors)
+    if why is not None:
+        raise CounterError(why)
+
+
 def make(
     name: str,
     preset: str = "tuned",
@@ -137,9 +144,5 @@ def make(
     sensors: Collection[Sensor] | None = None,
 ) -> StepCounter:
     """Build a counter; where `sensors` says what the device has, CounterError names those that are missing."""
-    chosen = kind(name)
-    lacking = [] if sensors is None else sorted(chosen.sensors - frozenset(sensors))
-    if lacking:
-        has = ", ".join(sorted(sensors or ())) or "none"
-        raise CounterError(f"{name} needs {', '.join(lacking)}; the device has {has}")
-    return chosen.build(parameters(name, preset, overrides))
+    require_sensors(name, sensors)
+    return kind(name).build(parameters(name, preset, overrides))

@@ -85,6 +85,7 @@ class KernelCounter:
         self.name = name
         self.params = params
         self.version = version
+        self.sensors = kernel.sensors
         self.latency_s = latency_s
         self.time_error_s = kernel.time_error / GRID_HZ
         self._kernel = kernel

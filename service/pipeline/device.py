@@ -17,6 +17,7 @@ from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State,
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Publish, Session
+from service.tracking.fitness import why_not
 from service.tracking.tracker import Tracker
 from service.wearables.contract import Wearable
 
@@ -56,7 +57,8 @@ class Device:
         return self.wanted and self.state in WAITING and time.monotonic() >= self.not_before_s
 
     def count_with(self, lineup: Lineup) -> None:
-        """Go on with these counters."""
+        """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
+        registry.require_sensors(lineup.primary, self.session.tracker.info.sensors)
         self.lineup = lineup
         self.session.change_counters(lineup)
 
@@ -66,12 +68,11 @@ class Device:
             raise NotNowError(f"{self.id} is {self.state.value}: connect it first, then begin")
 
     def calibrate(self, plan: Plan) -> Calibration:
-        """Begin a calibration; NotNowError where it cannot be now, CounterError where a sensor is missing."""
+        """Begin a calibration; NotNowError where it cannot be now, CounterError where the counter cannot count it."""
         self.require_streaming()
-        has = self.session.tracker.sensors
-        lacking = [] if has is None else sorted(registry.kind(plan.choice.name).sensors - has)
-        if lacking:
-            raise CounterError(f"{plan.choice.name} needs a {' and a '.join(lacking)}, and the device sends none")
+        name = plan.choice.name
+        if (why := why_not(name, registry.kind(name).sensors, self.session.tracker.stream)) is not None:
+            raise CounterError(why)
         return self.calibrations.begin(plan)
 
     def heard(self, sighting: Sighting, *, tell_every_s: float) -> None:

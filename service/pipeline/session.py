@@ -6,6 +6,7 @@ Steps and events are kept in memory, the newest LOG_NOTICES of them.
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections import deque
 from collections.abc import Callable
@@ -28,6 +29,8 @@ TELL_EVERY_NS = 1_000_000_000
 
 Publish = Callable[[Notice], None]
 
+logger = logging.getLogger(__name__)
+
 
 class Session:
     """One device's counting, over any number of links. `name_device` gives its id, `publish` takes each notice."""
@@ -43,6 +46,8 @@ class Session:
         self._clock = HostClock()
         self._ordinal = 0
         self._told_ns = 0
+        self._faults: dict[str, str] = {}
+        self._warned: set[str] = set()
 
     async def follow(self, link: Link) -> None:
         """Take the link's packets until it is lost (LinkError) or the task is cancelled."""
@@ -65,6 +70,7 @@ class Session:
             if isinstance(event, Rebooted):  # what came before it happened in the other boot's device time
                 clock = self._clock
             self.tell(event, self._host_ns(event, clock))
+        self._tell_faults()
         if abs(packet.at_ns - self._told_ns) >= TELL_EVERY_NS:
             self._told_ns = packet.at_ns
             self.tell(DeviceChanged(), packet.at_ns)
@@ -74,6 +80,7 @@ class Session:
         for event in self.tracker.change_counters(lineup.makers, primary=lineup.primary):
             self.tell(event, self._host_ns(event, self._clock))
         self.tell(DeviceChanged(), time.time_ns())
+        self._tell_faults()
 
     def state_changed(self, state: State, reason: str | None) -> None:
         """Tell that the device's connection came into another state."""
@@ -107,6 +114,18 @@ class Session:
     def steps(self) -> list[Notice]:
         """Return the steps kept, in the order they were confirmed."""
         return [notice for notice in self.log if isinstance(notice.event, StepCounted)]
+
+    def _tell_faults(self) -> None:
+        """Tell at once that a counter cannot count, or can again; say on the log why, once a session."""
+        faults = self.tracker.counter_faults
+        if faults == self._faults:
+            return
+        self._faults = dict(faults)
+        self.tell(DeviceChanged(), time.time_ns())
+        for why in faults.values():
+            if why not in self._warned:
+                self._warned.add(why)
+                logger.warning("%s: not counted: %s", self._name_device(), why)
 
     def _host_ns(self, event: Event, clock: HostClock) -> int:
         match event:

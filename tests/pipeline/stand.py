@@ -10,7 +10,7 @@ from service.links.ble import Sighting
 from service.pipeline.device import Device
 from service.pipeline.lifecycle import Cause
 from service.pipeline.lineup import lineup
-from service.samples import Packet
+from service.samples import ACCELEROMETER_ONLY, Packet
 from service.wearables import bracelet as wire
 
 MTU = 185
@@ -20,9 +20,19 @@ START_NS = 1_800_000_000_000_000_000
 class Stand:
     """One device; `schedule` is what its walker does, from the moment on that it is connected."""
 
-    def __init__(self, schedule, *, device_id="sim-1", seed=3, delay_s=0.05, counter="double_threshold", **options):
+    def __init__(
+        self,
+        schedule,
+        *,
+        device_id="sim-1",
+        seed=3,
+        delay_s=0.05,
+        counter="double_threshold",
+        sensors=ACCELEROMETER_ONLY,
+        **options,
+    ):
         self.now_ns = START_NS
-        self.walker = Walker(schedule, seed=seed)
+        self.walker = Walker(schedule, seed=seed, sensors=sensors)
         self.bracelet = Bracelet(self.walker, device_id=device_id, packet_samples=10)
         self.told = []
         sighting = Sighting(address=f"{device_id}:address", name="Bracelet", rssi_dbm=-50, services=(), handle=None)
@@ -42,6 +52,7 @@ class Stand:
         values = {
             wire.DEVICE_ID: self.bracelet.device_id_value(),
             wire.BOOT: self.bracelet.boot_value(),
+            wire.SENSORS: self.bracelet.sensors_value(),
             wire.SCALE: self.bracelet.scale_value(),
             wire.RATE: self.bracelet.rate_value(),
             wire.CLOCK: self.bracelet.clock_value(),

@@ -18,7 +18,7 @@ from service.pipeline.calibration import LONGEST_S, Calibration, Plan, State
 from service.pipeline.lifecycle import State as LinkState
 from service.pipeline.lineup import CounterChoice, lineup
 from service.pipeline.notices import Notice, StateChanged
-from service.samples import Gap, Gridded, Rebooted, SampleBlock, Segmented
+from service.samples import Gap, Gridded, Rebooted, SampleBlock, Segmented, Sensor
 
 DOUBLE = CounterChoice(name="double_threshold")
 STEPS_20 = Plan(choice=DOUBLE, method="walk", steps=20)
@@ -214,15 +214,41 @@ def test_a_device_that_does_not_stream_cannot_be_calibrated():
         stand.device.calibrate(STEPS_20)
 
 
-def test_a_missing_sensor_is_refused_once_samples_have_come_and_fails_before():
-    slowest = Plan(choice=CounterChoice(name="gyro_zero_crossing"), method="slowest_walk", steps=20)
+SLOWEST_20 = Plan(choice=CounterChoice(name="gyro_zero_crossing"), method="slowest_walk", steps=20)
+
+
+def test_a_missing_sensor_is_refused_at_once():
+    with pytest.raises(CounterError, match="needs gyroscope; the device has accelerometer"):
+        Stand("slow:60").device.calibrate(SLOWEST_20)
+
+
+def test_a_sensor_that_is_not_sent_fails_with_the_first_samples_and_is_refused_from_then_on():
     stand = Stand("slow:60")
-    begun = stand.device.calibrate(slowest)
+    tracker = stand.device.session.tracker
+    tracker.info = replace(tracker.info, sensors=tuple(Sensor))
+    begun = stand.device.calibrate(SLOWEST_20)
     stand.walk(1)
     assert begun.state is State.FAILED
     assert "gyroscope" in begun.reason
-    with pytest.raises(CounterError, match="gyroscope"):
-        stand.device.calibrate(slowest)
+    with pytest.raises(CounterError, match="does not send"):
+        stand.device.calibrate(SLOWEST_20)
+
+
+def test_the_slowest_walk_is_learnt_on_a_device_with_a_gyroscope(monkeypatch):
+    monkeypatch.setattr("service.counters.streaming.compiled", lambda kernel: kernel)  # compiling takes seconds
+    stand = Stand("slow:60", sensors=tuple(Sensor))
+    begun = stand.device.calibrate(SLOWEST_20)
+    stand.until(lambda: begun.state is not State.RECORDING)
+    assert begun.state is State.DONE
+    assert begun.steps >= 20
+
+
+def test_a_device_too_slow_to_count_on_cannot_be_calibrated():
+    stand = Stand("normal:60")
+    tracker = stand.device.session.tracker
+    tracker.info = replace(tracker.info, rate_hz=5.0)
+    with pytest.raises(CounterError, match="10 samples a second or more; the device takes 5"):
+        stand.device.calibrate(STEPS_20)
 
 
 @pytest.mark.parametrize(

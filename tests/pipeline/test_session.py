@@ -1,11 +1,14 @@
 """A session: what it tells, to whom, and the host time it tells it with."""
 
+import logging
 from dataclasses import replace
 
-from fakes import MetronomeCounter, data_packets, described
+from fakes import MetronomeCounter, data_packet, data_packets, described
 
+from service.pipeline.lineup import lineup
+from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Session
-from service.samples import GRID_HZ, Gridded, Rebooted, Step, StepCounted, Update
+from service.samples import GRID_HZ, Gridded, Rebooted, Sensor, Step, StepCounted, Update
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 
@@ -68,3 +71,38 @@ def test_an_observer_may_leave_while_it_is_told():
         made.apply(packet)
     assert len(heard) == 2
     assert made.observers == []
+
+
+A, G, M = Sensor
+
+
+def described_to(counter, published, **said):
+    chosen = lineup(counter)
+    made = Session(lambda: "sim-1", Tracker(wire.Bracelet(), chosen.makers, primary=counter), published.append)
+    for packet in described(**said):
+        made.apply(packet)
+    return made
+
+
+def test_a_missing_sensor_is_on_the_log_before_the_first_sample(caplog):
+    published = []
+    with caplog.at_level(logging.WARNING):
+        described_to("fusion", published)
+    why = "fusion needs gyroscope, magnetometer; the device has accelerometer"
+    assert [record.getMessage() for record in caplog.records] == [f"sim-1: not counted: {why}"]
+    assert isinstance(published[-1].event, DeviceChanged)
+
+
+def test_a_sensor_that_comes_and_goes_is_on_the_log_once_and_told_each_time(caplog):
+    published = []
+    with caplog.at_level(logging.WARNING):
+        made = described_to("gyro_zero_crossing", published, sensors=(A, G))
+        at, changes = 0, 0
+        for held in [(A, G), (A,), (A, G), (A,), (A, G)]:
+            published.clear()
+            made.apply(data_packet(at, sensors=held))
+            changes += any(isinstance(notice.event, DeviceChanged) for notice in published)
+            at += 10
+    assert len(caplog.records) == 1
+    assert "does not send" in caplog.text
+    assert changes >= 4
