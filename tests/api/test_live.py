@@ -87,7 +87,7 @@ async def test_each_step_is_told_within_a_quarter_second_of_its_peak_then_confir
     assert sum(one <= 0.25 for one in late_s) >= 0.95 * len(late_s)
     for step in confirmed[10:]:
         told = likely[step["device_s"]][0]
-        assert told["heading_deg"] is None  # the simulated bracelet of this test has an accelerometer only
+        assert told["heading_deg"] is None  # this bracelet has an accelerometer only
         assert told["device_uncertainty_s"] == pytest.approx(0.01, abs=0.003)
         assert told["device_uncertainty_s"] < told["at_uncertainty_s"] < 0.15
         assert step["at_uncertainty_s"] >= step["device_uncertainty_s"]

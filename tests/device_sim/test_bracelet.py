@@ -202,7 +202,7 @@ def test_every_sensor_is_sent_to_half_a_bit(sensors, mtu, n):
 
 
 def test_what_has_no_room_is_left_out_of_the_packet_and_comes_back_with_a_larger_mtu():
-    bracelet = Bracelet(turned(40, tuple(Sensor)))
+    bracelet = Bracelet(turned(40, tuple(Sensor)), packet_samples=10)
     decoder = host(bracelet)
     decoder.feed(wire.SENSORS, bracelet.sensors_value())
     bracelet.measure(20)
