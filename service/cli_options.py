@@ -94,8 +94,8 @@ def add_bracelet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--packet-samples",
         type=int,
-        default=10,
-        help="most samples of one packet; 0 fills the MTU, 10 at 50 Hz are 0.2 s (default 10)",
+        default=8,
+        help="most samples of one packet; 0 fills the MTU, 8 at 50 Hz are 0.16 s (default 8)",
     )
 
 

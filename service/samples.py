@@ -123,19 +123,22 @@ class Band:
     lower: float
 
 
+Likely = tuple[float, float, bool]
+"""A step that may come: device time, strength, whether it passes what is in force. Confirmed, it has the same time."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Update:
     """What a counter says after a block: steps now certain, how many more are likely, and its view for the plot.
 
-    `likely` names the pending steps where the counter can tell them apart; those it names no more and has not confirmed
-    are retracted. `trace` holds the filtered signal, one value a sample of the block, the first at device time
-    `trace_from_s`.
+    `likely` names every peak that can still become a step, where the counter can tell them apart; one it names no more
+    and has not confirmed is retracted. `pending` counts those of them that pass what is in force. `trace` holds the
+    filtered signal, one value a sample of the block, the first at device time `trace_from_s`.
     """
 
     steps: tuple[Step, ...] = ()
     pending: int = 0
-    likely: Sequence[tuple[float, float]] = ()
-    """(device time, strength) of each; a step confirmed later has the same `at_s`."""
+    likely: Sequence[Likely] = ()
     trace_from_s: float = 0.0
     trace: Sequence[float] = ()
     bands: tuple[Band, ...] = ()
@@ -170,31 +173,52 @@ class DeviceInfo:
     sensors: Sensors | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heading:
+    """The direction somebody walks in, degrees clockwise from magnetic north, and its standard uncertainty.
+
+    Where `is_line`, that or the opposite one: `deg` is in [0, 180).
+    """
+
+    deg: float
+    uncertainty_deg: float
+    is_line: bool
+
+
 # What a Tracker emits. A session adds the device's id, an ordinal to the durable ones, and UTC.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepCounted:
-    """Durable: one confirmed step; `steps` is this counter's count with it, `boot` the boot its time belongs to."""
+    """Durable: one confirmed step; `steps` is this counter's count with it, `boot` the boot its time belongs to.
+
+    Its time is known to `uncertainty_s`. `heading` is None where the sensors give none.
+    """
 
     counter: str
     boot: int
     steps: int
     step: Step
+    uncertainty_s: float = 0.5 / GRID_HZ
+    heading: Heading | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tentative:
     """Neither kept nor numbered: the primary's step at `at_s` is likely, or is `retracted`; a StepCounted confirms it.
 
-    `interval_s` is the time since the likely or confirmed step before, None after a pause.
+    `passes` tells whether it passes what was in force when it was told: the sure ones. `interval_s` is the time since
+    the confirmed step or the sure one before, None after a pause. Time and heading as in StepCounted.
     """
 
     boot: int
     at_s: float
     strength: float
     interval_s: float | None
+    passes: bool
     retracted: bool
+    uncertainty_s: float = 0.5 / GRID_HZ
+    heading: Heading | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

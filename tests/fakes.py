@@ -16,6 +16,7 @@ class MetronomeCounter:
     name = "metronome"
     sensors = ACCELEROMETER_ONLY
     latency_s = 0.0
+    time_error_s = 0.0
 
     def __init__(self):
         self.seen: list[tuple[int, int]] = []

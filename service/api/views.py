@@ -114,6 +114,7 @@ def step_view(notice: Notice) -> models.StepEvent:
         boot=event.boot,
         counter=event.counter,
         steps=event.steps,
+        **_known(notice, event),
         strength=step.strength,
         interval_s=step.interval_s,
         peak=step.peak,
@@ -160,12 +161,25 @@ def _tentative_view(notice: Notice, event: Tentative) -> models.TentativeEvent:
         device=notice.device,
         at=utc(notice.at_ns),
         status="retracted" if event.retracted else "likely",
+        passes=event.passes,
         device_s=event.at_s,
         boot=event.boot,
-        at_uncertainty_s=round(notice.uncertainty_s, 6),
+        **_known(notice, event),
         strength=event.strength,
         interval_s=event.interval_s,
     )
+
+
+def _known(notice: Notice, event: StepCounted | Tentative) -> dict[str, Any]:
+    """Return how well a step's times are known, and its heading."""
+    heading = event.heading
+    return {
+        "device_uncertainty_s": round(event.uncertainty_s, 6),
+        "at_uncertainty_s": round(notice.uncertainty_s + event.uncertainty_s, 6),
+        "heading_deg": round(heading.deg, 1) if heading else None,
+        "heading_uncertainty_deg": round(heading.uncertainty_deg, 1) if heading else None,
+        "heading_is_line": heading.is_line if heading else None,
+    }
 
 
 def _ephemeral_view(notice: Notice, event: Signal | Counting) -> models.SignalEvent | models.CountingEvent:

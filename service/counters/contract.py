@@ -37,6 +37,10 @@ class StepCounter(Protocol):
     def latency_s(self) -> float:
         """The longest time from a step to its confirmation, in seconds of device time."""
 
+    @property
+    def time_error_s(self) -> float:
+        """How far a step's time may be off besides half a sample: by what its filters delay one motion or another."""
+
     def update(self, block: SampleBlock) -> Update:
         """Count on over `block`; blocks come in order and do not overlap."""
 

@@ -13,6 +13,8 @@ from collections.abc import MutableSequence, Sequence
 from math import sqrt
 from typing import Final
 
+from service.samples import Likely
+
 # Constants of an instance.
 Y_WEIGHT: Final = 0  # 1 for the norm, 0 for √(X²+Z²)
 HALF: Final = 1  # N of (7), (8)
@@ -159,30 +161,61 @@ def stop(s: State) -> None:
 
 
 def pending(s: State) -> int:
-    """Return how many peaks are likely to become steps."""
-    return len(likely(s))
+    """Return how many peaks pass what is known of the rules."""
+    return sum(passes for _, _, passes in likely(s))
 
 
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return index and height of the peaks that are likely to become steps.
+def likely(s: State) -> list[Likely]:
+    """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
-    Those are the held ones of a bout that is not certain yet, and undecided ones above T_H that rise above L by more
-    than rest.
+    Those are the held ones of a bout that can still become certain, and all undecided ones that no rule excludes yet.
+    One passes if it does by the thresholds of the last window and no other that does lies too near before it.
     """
-    found: list[tuple[float, float]] = []
-    if s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT] and s[NEXT] - s[HALF] - s[LAST] < s[MAX_SPACING]:
-        for i in range(int(s[BOUT_PEAKS])):
-            held = HELD + i * ROW
-            found.append((s[held + 1], s[held + 3] - s[held + 4]))
-    if s[HIGH_KNOWN] == 0.0 or s[LOW_KNOWN] == 0.0:
-        return found
-    upper, low, rest = (s[HIGH] + s[LOW]) / 2.0, s[LOW], s[REST]
+    peaks, bout, last = s[BOUT_PEAKS], s[BOUT], s[LAST]
+    uncertain = 0.0 < peaks < bout and s[CREDIT] > 0.0
+    waiting = _waiting(s) if s[COUNT] > 0.0 else []
+    if not uncertain:
+        return waiting
+    first = waiting[0][0] if waiting else s[NEXT] - s[HALF]
+    if min(first, s[NEXT] - s[HALF]) - last >= s[MAX_SPACING]:
+        return waiting
+    held = range(HELD, HELD + int(peaks) * ROW, ROW)
+    return [(s[i + 1], s[i + 3] - s[i + 4], True) for i in held] + waiting
+
+
+def _waiting(s: State) -> list[Likely]:
+    """Return the undecided peaks that no rule excludes yet."""
+    found: list[Likely] = []
+    upper, low, rest = s[HIGH], s[FILTERED], s[REST]
+    in_force = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    if in_force:
+        upper, low = (s[HIGH] + s[LOW]) / 2.0, s[LOW]
+    nearest = s[MIN_SPACING]
+    after = s[LAST] + nearest if s[BOUT_PEAKS] > 0.0 else -1.0
+    sure_after = after
+    short = 0.0 if s[CREDIT] > 0.0 else s[BOUT] - s[BOUT_PEAKS] - 1.0
     head, capacity = int(s[HEAD]), int(s[CAPACITY])
     for i in range(int(s[COUNT])):
         q = QUEUE + (head + i) % capacity * ENTRY
-        if s[q + PEAK] > upper and s[q + PEAK] - low >= rest:
-            found.append((s[q + AT], s[q + PEAK] - low))
+        at, peak = s[q + AT], s[q + PEAK]
+        if at <= after or (s[q + CLOSED] > 0.0 and not _can_pass(s, q)):
+            continue
+        if short > 0.0:
+            short -= 1.0  # a reference at most
+            continue
+        height = peak - low
+        passes = in_force and peak > upper and height >= rest and at > sure_after
+        if passes:
+            sure_after = at + nearest
+        found.append((at, max(height, 0.0), passes))
     return found
+
+
+def _can_pass(s: State, q: int) -> bool:
+    """Tell whether the peak at queue place `q`, whose thresholds are known, can still pass them."""
+    if s[q + PEAK] <= s[q + UPPER]:
+        return False
+    return s[q + SEEN] < s[VALLEYS] or s[q + VALLEY] < s[q + LOWER]
 
 
 def _peak(s: State, at: float, value: float) -> None:

@@ -139,6 +139,10 @@ TUNED: Final = FusionParams(
 )
 
 
+DISPERSION: Final = 0.11
+"""Share by which a filter's delay at its cut-off exceeds the one far below it, which is taken and rounded."""
+
+
 def build(params: FusionParams = TUNED) -> KernelCounter:
     """Return the fusion counter: blocks carry acceleration (g), angular rate (rad/s) and field (µT).
 
@@ -161,6 +165,7 @@ def build(params: FusionParams = TUNED) -> KernelCounter:
             constants=state.CONSTANTS,
             row=state.ROW,
             delay=delay,
+            time_error=0.5 + DISPERSION * delay,
             sensors=(Sensor.ACCELEROMETER, Sensor.GYROSCOPE, Sensor.MAGNETOMETER),
         ),
         state=_fresh_state(params),

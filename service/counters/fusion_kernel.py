@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from service.counters.fusion_ahead import coming_peaks
 from service.counters.fusion_checks import (
     CHANNELS,
     DEPTH,
@@ -62,6 +63,7 @@ from service.counters.fusion_state import (
     State,
 )
 from service.counters.fusion_steps import end_bout, take_pair
+from service.samples import Likely
 from service.signals.orientation import advance, horizontal
 from service.signals.orientation import begin as begin_orientation
 
@@ -155,26 +157,35 @@ def stop(s: State) -> None:
 
 
 def pending(s: State) -> int:
-    """Return how many steps are likely."""
-    return len(likely(s))
+    """Return how many peaks are held or high enough."""
+    return sum(passes for _, _, passes in likely(s))
 
 
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return index and height of the peaks that are likely to become steps.
+def likely(s: State) -> list[Likely]:
+    """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
-    Those are the held ones of a bout that is not certain yet, and the last peak if it rises by more than rest above its
-    valley, or above the one before as long as its own has not come.
+    Those are the held ones of a bout that can still become certain, the last peak, and those that the filter is about
+    to let out. One passes if it rises by more than rest above its valley, or above the one before as long as its own
+    has not come.
     """
-    found: list[tuple[float, float]] = []
-    if s[BOUT_STEPS] < s[BOUT] and s[NEXT] - s[ACCEPTED] < s[MAX_STEP]:
-        for i in range(int(s[BOUT_STEPS])):
-            held = HELD + i * ROW
-            found.append((s[held], s[held + 2] - s[held + 3]))
+    found: list[Likely] = []
     at, value, valley = s[PEAK_AT], s[PEAK_VALUE], s[VALUE]
     if s[KIND] == PEAK:
         at, value, valley = s[AT], s[VALUE], s[VALLEY_VALUE]
-    if at >= 0.0 and s[NEXT] - at <= s[PAUSE] and value - valley > s[REST]:
-        found.append((at, value - valley))
+    waits = s[KIND] != 0.0 and at >= 0.0 and (s[KIND] == VALLEY or s[NEXT] - at <= s[PAUSE] + 1.0)
+    newest = at if waits else s[NEXT] - 2.0
+    if 0.0 < s[BOUT_STEPS] < s[BOUT] and min(newest, s[NEXT] - 2.0) - s[ACCEPTED] < s[MAX_STEP]:
+        for i in range(int(s[BOUT_STEPS])):
+            held = HELD + i * ROW
+            found.append((s[held], s[held + 2] - s[held + 3], True))
+    if waits:
+        height = value - valley
+        found.append((at, height if 0.0 < height < value else 0.0, height > s[REST]))
+    if s[NEXT] >= 0.0:
+        valley = s[VALUE] if s[KIND] == VALLEY else s[VALLEY_VALUE]
+        for coming, value in coming_peaks(s):
+            passes = s[KIND] == VALLEY and value - valley > s[REST]
+            found.append((coming, value - valley if valley < value else 0.0, passes))
     return found
 
 

@@ -78,6 +78,9 @@ from service.samples import GRID_HZ, Band, SampleBlock, Sensor, Step
 ORDER: Final = 6
 """Of the Butterworth low-pass (section C)."""
 
+TIME_ERROR: Final = 0.2
+"""Samples (4 ms) by which its delay differs between a stride of 0.4 and of 1.4 Hz."""
+
 STRIDE_HZ: Final = 0.9
 """The swing at an everyday 1.8 steps/s: the filter's delay is taken there; from 0.4 to 1.4 Hz it differs by 4 ms."""
 
@@ -133,6 +136,7 @@ _KERNEL: Final = Kernel(
     constants=kernel.CONSTANTS,
     row=kernel.ROW,
     delay=0.0,
+    time_error=TIME_ERROR,
     sensors=(Sensor.GYROSCOPE,),
 )
 """But for the delay, which the cut-off decides."""

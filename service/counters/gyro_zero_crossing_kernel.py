@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import MutableSequence, Sequence
 from typing import Final
 
+from service.samples import Likely
+
 # Constants of an instance.
 AXIS: Final = 0  # 0, 1, 2; LARGEST follows the axis of largest variance
 PEAK_THRESHOLD: Final = 1  # rad/s
@@ -159,23 +161,28 @@ def stop(s: State) -> None:
 
 
 def pending(s: State) -> int:
-    """Return how many steps are likely."""
-    return len(likely(s))
+    """Return how many steps are held or past their threshold."""
+    return sum(passes for _, _, passes in likely(s))
 
 
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return where and how strong: steps held, unless their bout has ended, and a crossing past its threshold."""
-    found: list[tuple[float, float]] = []
+def likely(s: State) -> list[Likely]:
+    """Return every crossing that can still become a step: where, how strong, and whether it is past its threshold.
+
+    Those are the held ones, unless their bout has ended, and the one that waits for its extremum.
+    """
+    found: list[Likely] = []
+    waits = s[CANDIDATE] != 0.0 and s[NEXT] - s[CROSSED] <= s[WAIT] + 1.0
     if s[COUNT] > 0.0:
         ended = s[NEXT] - s[LAST] - s[WAIT] >= s[MAX_SPACING]
+        if waits and s[CROSSED] - s[LAST] < s[MAX_SPACING]:
+            ended = False
         head, capacity = int(s[HEAD]), int(s[CAPACITY])
         for i in range(int(s[COUNT] - s[UNSURE] if ended else s[COUNT])):
             q = QUEUE + (head + i) % capacity * ENTRY
-            found.append((s[q], abs(s[q + 2])))
-    if s[CANDIDATE] != 0.0 and s[NEXT] - s[CROSSED] <= s[WAIT]:
+            found.append((s[q], abs(s[q + 2]), True))
+    if waits:
         past = s[FILTERED] > s[PEAK_THRESHOLD] if s[CANDIDATE] > 0.0 else s[FILTERED] < s[VALLEY_THRESHOLD]
-        if past:
-            found.append((s[CROSSED], abs(s[FILTERED])))
+        found.append((s[CROSSED], abs(s[FILTERED]), past))
     return found
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from service.counters.contract import Snapshot, check_snapshot, params_hash
 from service.errors import CounterError
-from service.samples import GRID_HZ, Band, Column, SampleBlock, Sensor, Step, Update
+from service.samples import GRID_HZ, Band, Column, Likely, SampleBlock, Sensor, Step, Update
 from service.signals.compiled import compiled
 
 COMPILED_FROM: Final = 2000
@@ -42,10 +42,11 @@ class Kernel:
     `scan(*columns, n, s, out)` eats n samples, writes the filtered signal to `out[:n]` and rows after it, and returns
     where they end; it is compiled for whole recordings. `close(s, out)` ends the stretch (at a gap or the end), writes
     rows to `out[0:]` and returns where they end. `stop(s)` forgets what must not outlast the end of the stream.
-    `pending(s)` counts likely steps; `likely(s)`, where an algorithm can name them, gives the grid index (the filter's
-    delay not removed) and the strength of each. `s[next_index]` is the index of the sample to come, −1 before the first
-    stretch; `s[:constants]` never changes. A row is `row` floats; `delay` is by how many samples the filtered signal
-    lags.
+    `likely(s)`, where an algorithm can name them, gives every peak that can still become a step: grid index (the
+    filter's delay not removed), strength, whether it passes what is in force; `pending(s)` counts those that pass.
+    `s[next_index]` is the index of the sample to come, −1 before the first stretch; `s[:constants]` never changes. A
+    row is `row` floats; `delay` is by how many samples the filtered signal lags, give or take
+    `time_error`.
     """
 
     begin: Callable[..., None]
@@ -57,7 +58,8 @@ class Kernel:
     constants: int
     row: int
     delay: float
-    likely: Callable[[Any], list[tuple[float, float]]] | None = None
+    likely: Callable[[Any], list[Likely]] | None = None
+    time_error: float = 0.0
     sensors: tuple[Sensor, ...] = (Sensor.ACCELEROMETER,)
 
 
@@ -85,6 +87,7 @@ class KernelCounter:
         self.version = version
         self.sensors = kernel.sensors
         self.latency_s = latency_s
+        self.time_error_s = kernel.time_error / GRID_HZ
         self._kernel = kernel
         self._state = state
         self._room_for = room
@@ -96,7 +99,7 @@ class KernelCounter:
         """Count on over `block`; ValueError where it overlaps, CounterError where a sensor is missing."""
         kernel, n = self._kernel, len(block)
         if n == 0:
-            return Update(pending=kernel.pending(self._state))
+            return Update(pending=kernel.pending(self._state), likely=self._likely() or ())
         columns = self._columns(block)
         rows = [] if block.start == self._state[kernel.next_index] else self._open(block.start, columns)
         if n > COMPILED_FROM:
@@ -108,7 +111,7 @@ class KernelCounter:
         likely = self._likely()
         return Update(
             steps=steps,
-            pending=len(likely) if kernel.likely else kernel.pending(self._state),
+            pending=sum([one[2] for one in likely]) if kernel.likely else kernel.pending(self._state),
             likely=likely,
             trace_from_s=(block.start - kernel.delay) / GRID_HZ,
             trace=trace,
@@ -148,11 +151,13 @@ class KernelCounter:
         """Return the steps that `count`'s rows say."""
         return self._events(rows.ravel().tolist())[0]
 
-    def _likely(self) -> list[tuple[float, float]]:
-        if self._kernel.likely is None:
+    def _likely(self) -> list[Likely]:
+        kernel = self._kernel
+        found = kernel.likely(self._state) if kernel.likely else None
+        if not found:
             return []
-        delay = self._kernel.delay
-        return [((index - delay) / GRID_HZ, strength) for index, strength in self._kernel.likely(self._state)]
+        delay = kernel.delay
+        return [((index - delay) / GRID_HZ, strength, passes) for index, strength, passes in found]
 
     def _columns(self, block: SampleBlock) -> tuple[Column, ...]:
         columns: tuple[Column, ...] = ()

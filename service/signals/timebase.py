@@ -66,6 +66,15 @@ class Timebase:
         """Device time of the newest sample, in seconds after boot."""
         return self._lanes["acc_g"][grid.PLACE] / GRID_HZ if self._lanes else 0.0
 
+    @property
+    def uncertainty_s(self) -> float:
+        """How well device time knows where in a signal a sample of the grid lies, in seconds.
+
+        Half the spacing of the grid or of the device's own samples, whichever is wider; where it tells ticks, also half
+        a tick and how far the newest one lies off the grid.
+        """
+        return (0.5 * max(1.0, self._fit.pace) + self._fit.deviation) / GRID_HZ
+
     def set_clock(self, index: int, tick: int) -> None:
         """Take the device's full tick at a sample: tells the high bits of the ticks in packets."""
         self._clock = (index, tick)
@@ -184,6 +193,11 @@ class _RateFit:
         self._error = 0.0
         """How far that tick lies ahead of the grid, grid units."""
         self._anchors: list[tuple[int, float]] = []
+
+    @property
+    def deviation(self) -> float:
+        """How far the device's clock and the grid may differ, grid units; 0 where it has told no tick."""
+        return abs(self._error) + _TICK / 2 if self._seen else 0.0
 
     def anchor(self, start: float, tick: int) -> float:
         """Return where a stretch begins after a break: `start` if the tick agrees with it, else the tick's place."""

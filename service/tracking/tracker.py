@@ -8,7 +8,7 @@ skipped; samples seen before are dropped; samples that arrive late, behind newer
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ from service.samples import (
     DeviceInfo,
     Event,
     Gridded,
+    Likely,
     Packet,
     RawBlock,
     Rebooted,
@@ -30,9 +31,11 @@ from service.samples import (
     Sensor,
     Sensors,
     Signal,
+    Step,
     StepCounted,
     Update,
 )
+from service.signals.heading import WalkingDirection
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
 from service.tracking.doubt import Doubt, index_ahead
@@ -83,6 +86,7 @@ class Tracker:
         self._counters = {name: make() for name, make in counters.items()}
         self._cadence = Cadence()
         self._tentative = TentativeSteps()
+        self._heading = WalkingDirection()
         self._timebase: Timebase | None = None
         self._boot: int | None = None
         self._next_index = 0
@@ -141,7 +145,7 @@ class Tracker:
         """
         kept = {name for name, make in counters.items() if self._factories.get(name) == make}
         dropped = [name for name in self._counters if name not in kept]
-        events = [event for name in dropped for event in self._confirm(name, self._counters[name].finish())]
+        events = [event for name in dropped for event in self._take(name, self._counters[name].finish())]
         before = self.total
         self.steps = {name: self.steps[name] if name in kept else 0 for name in counters}
         self._counters = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
@@ -152,15 +156,12 @@ class Tracker:
             return events
         self.primary, self._segment = primary, (before, self.steps[primary])
         self._cadence = Cadence()
-        events += self._tentative.follow(self._boot or 0, (), ())
+        events += self._follow((), ())
         return [*events, Segmented(primary=primary, steps=before), self._counting(0)]
 
     def finish(self) -> list[Event]:
         """End the stream: decide what is still pending."""
-        events = self._finish_counters()
-        confirmed = [event.step for event in events if isinstance(event, StepCounted)]
-        events += self._tentative.follow(self._boot or 0, (), confirmed)
-        return [*events, self._counting(0)]
+        return [*self._finish_counters(), self._counting(0)]
 
     def snapshot(self) -> dict[str, Any]:
         """Return the whole state as plain data."""
@@ -173,6 +174,7 @@ class Tracker:
             "segment": list(self._segment),
             "cadence": self._cadence.snapshot(),
             "tentative": self._tentative.snapshot(),
+            "heading": self._heading.snapshot(),
             "boot": self._boot,
             "next_index": self._next_index,
             "counter_faults": dict(self.counter_faults),
@@ -196,6 +198,7 @@ class Tracker:
         self._segment = (before, own)
         self._cadence.restore(state["cadence"])
         self._tentative.restore(state["tentative"])
+        self._heading.restore(state["heading"])
         self._boot, self._next_index = state["boot"], state["next_index"]
         self.counter_faults = dict(state["counter_faults"])
         self._doubt.restore(state["doubt"])
@@ -242,6 +245,7 @@ class Tracker:
             self.tally.gaps += 1
             self.tally.samples_lost += gap.samples
             events.append(gap)
+        self._heading.update(samples)
         events.append(Gridded(block=samples))
         pending = self.steps_now - self.total if self.primary in self.counter_faults else 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
@@ -250,10 +254,9 @@ class Tracker:
             except CounterError as fault:
                 self.counter_faults[name] = str(fault)
                 continue
-            events += self._confirm(name, update)
+            events += self._take(name, update)
             if name == self.primary:
                 pending = update.pending
-                events += self._tentative.follow(self._boot or 0, update.likely, update.steps)
                 if len(update.trace) or update.bands:
                     events.append(Signal(from_s=update.trace_from_s, values=update.trace, bands=update.bands))
         events.append(self._counting(pending))
@@ -279,11 +282,9 @@ class Tracker:
         previous = boot if self._boot is None else self._boot
         self.tally.reboots += 1
         events = self._finish_counters()
-        confirmed = [event.step for event in events if isinstance(event, StepCounted)]
-        events += self._tentative.follow(previous, (), confirmed)
         self._counters = {name: make() for name, make in self._factories.items()}
-        self._cadence = Cadence()
-        self._timebase, self._next_index = None, 0
+        self._cadence, self._tentative = Cadence(), TentativeSteps()
+        self._timebase, self._next_index, self._heading = None, 0, WalkingDirection()
         if self.info.boot != boot or previous == boot:
             self.info = dataclasses.replace(self.info, boot=boot, clock=None)
         self._boot = boot
@@ -318,17 +319,45 @@ class Tracker:
                 self._timebase.set_clock(*self.info.clock)
         return self._timebase
 
-    def _confirm(self, name: str, update: Update) -> list[Event]:
+    def _take(self, name: str, update: Update) -> list[Event]:
+        """Take what a counter says: of the primary, tentative steps first, so that each step has been told before."""
         events: list[Event] = []
+        if name == self.primary:
+            events += self._follow(update.likely, update.steps)
         for step in update.steps:
             self.steps[name] += 1
-            events.append(StepCounted(counter=name, boot=self._boot or 0, steps=self.steps[name], step=step))
+            events.append(
+                StepCounted(
+                    counter=name,
+                    boot=self._boot or 0,
+                    steps=self.steps[name],
+                    step=step,
+                    uncertainty_s=self._uncertainty_s(name),
+                    heading=self._heading.at(step.at_s),
+                )
+            )
             if name == self.primary:
                 self._cadence.add(step.at_s)
         return events
 
+    def _follow(self, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Event]:
+        """Tell what the primary calls likely, and take back what it does no more."""
+        told = self._tentative.follow(self._boot or 0, likely, confirmed)
+        if not told:
+            return []
+        uncertainty_s = self._uncertainty_s(self.primary)
+        return [
+            dataclasses.replace(event, uncertainty_s=uncertainty_s, heading=self._heading.at(event.at_s))
+            for event in told
+        ]
+
+    def _uncertainty_s(self, name: str) -> float:
+        """Return how well the device time of this counter's steps is known."""
+        timebase_s = self._timebase.uncertainty_s if self._timebase else 0.5 / GRID_HZ
+        return timebase_s + self._counters[name].time_error_s
+
     def _finish_counters(self) -> list[Event]:
-        return [event for name, counter in self._counters.items() for event in self._confirm(name, counter.finish())]
+        return [event for name, counter in self._counters.items() for event in self._take(name, counter.finish())]
 
     def _counting(self, pending: int) -> Counting:
         steps = self.total

@@ -273,8 +273,8 @@ def test_likely_steps_are_named_before_they_are_certain_and_keep_their_time():
     steps = []
     for k, value in enumerate(norm):
         update = counter.update(block_of([value], start=k))
-        assert update.pending == len(update.likely)
-        for at_s, strength in update.likely:
+        assert update.pending == sum(passes for _, _, passes in update.likely)
+        for at_s, strength, _ in update.likely:
             assert strength >= 0.0
             if at_s not in named and len(steps) > 6:
                 assert k / GRID_HZ - at_s <= 0.25

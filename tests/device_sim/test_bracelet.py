@@ -83,14 +83,14 @@ def test_a_packet_holds_what_fits_but_no_more_than_asked(radio, mtu, packet_samp
 
 
 def test_the_end_of_the_source_sends_the_rest(radio):
-    bracelet = Bracelet(radio.Known(13))
+    bracelet = Bracelet(radio.Known(13), packet_samples=10)
     assert bracelet.measure(20) == 13
     assert bracelet.ended
     assert [len(block) for block in drain(bracelet, host(bracelet))] == [10, 3]
 
 
 def test_what_nobody_takes_is_lost_and_its_numbers_are_not_given_again(radio):
-    bracelet = Bracelet(radio.Known(100))
+    bracelet = Bracelet(radio.Known(100), packet_samples=10)
     bracelet.measure(25)
     bracelet.discard()
     bracelet.measure(10)
@@ -131,7 +131,7 @@ def test_a_reset_counts_from_zero_under_the_next_boot_number(radio):
 
 
 def test_the_index_wraps_and_the_tick_goes_on(radio):
-    bracelet = Bracelet(radio.Endless(), index=2**32 - 10)
+    bracelet = Bracelet(radio.Endless(), index=2**32 - 10, packet_samples=10)
     decoder = host(bracelet)
     bracelet.measure(20)
     before, after = drain(bracelet, decoder)
@@ -202,7 +202,7 @@ def test_every_sensor_is_sent_to_half_a_bit(sensors, mtu, n):
 
 
 def test_what_has_no_room_is_left_out_of_the_packet_and_comes_back_with_a_larger_mtu():
-    bracelet = Bracelet(turned(40, tuple(Sensor)))
+    bracelet = Bracelet(turned(40, tuple(Sensor)), packet_samples=10)
     decoder = host(bracelet)
     decoder.feed(wire.SENSORS, bracelet.sensors_value())
     bracelet.measure(20)

@@ -33,7 +33,7 @@ class Stand:
     ):
         self.now_ns = START_NS
         self.walker = Walker(schedule, seed=seed, sensors=sensors)
-        self.bracelet = Bracelet(self.walker, device_id=device_id)
+        self.bracelet = Bracelet(self.walker, device_id=device_id, packet_samples=10)
         self.told = []
         sighting = Sighting(address=f"{device_id}:address", name="Bracelet", rssi_dbm=-50, services=(), handle=None)
         self.device = Device(sighting, wire.Bracelet(), lineup(counter, **options), self.told.append)

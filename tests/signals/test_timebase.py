@@ -150,6 +150,20 @@ def test_all_sensors_share_one_grid():
     assert len(samples) == 19
 
 
+def test_how_well_a_moment_is_known_is_half_a_sample_and_what_the_ticks_leave_open():
+    untold = Timebase(50)
+    run(untold, [10] * 10, 50, tick=False)
+    assert untold.uncertainty_s == 0.01
+    slow = Timebase(12.5)
+    run(slow, [10] * 10, 12.5, tick=False)
+    assert slow.uncertainty_s == 0.04
+    steady, drifting = Timebase(50), Timebase(50)
+    run(steady, [10] * 100, 50)
+    run(drifting, [10] * 30, 51)
+    assert 0.01 < steady.uncertainty_s < 0.012
+    assert drifting.uncertainty_s > 0.02
+
+
 def held(index, n, *sensors):
     """A block at 25 Hz whose named sensors all hold the same values."""
     column = [value(i) for i in range(index, index + n)]

@@ -285,7 +285,7 @@ class Foresight(MetronomeCounter):
         update = super().update(block)
         ahead = [k / GRID_HZ for k in range(self._next, self._next + 10) if k % EVERY == 0]
         false = [1.3] if 1.0 <= self._next / GRID_HZ < 1.5 else []
-        return replace(update, likely=[(at_s, 0.5) for at_s in (*ahead, *false)])
+        return replace(update, likely=[(at_s, 0.5, True) for at_s in (*ahead, *false)])
 
 
 def test_likely_steps_are_told_then_confirmed_or_retracted():
@@ -293,7 +293,8 @@ def test_likely_steps_are_told_then_confirmed_or_retracted():
     events = run(tracker, [*described(), *data_packets([10] * 10)])
     told = [(event.at_s, event.interval_s, event.retracted) for event in only(events, Tentative)]
     assert told == [
-        (0.5, None, False),
+        (0.0, None, False),  # confirmed at first sight
+        (0.5, 0.5, False),
         (1.0, 0.5, False),
         (1.3, pytest.approx(0.3), False),
         (1.5, pytest.approx(0.2), False),
