@@ -175,6 +175,7 @@ def test_a_likely_step_goes_where_it_is_counted_or_taken_back(run: Run) -> None:
     const trace = new Trace();
     for (const s of [1, 2, 3]) trace.addTentative({ status: "likely", device_s: s }, 0, "counter");
     trace.addTentative({ status: "likely", device_s: 1.004 }, 0, "counter");
+    trace.addTentative({ status: "likely", device_s: 4, passes: false }, 0, "counter");
     trace.addTentative({ status: "retracted", device_s: 2 }, 1000, "counter");
     trace.addStep({ ordinal: 1, counter: "other", device_s: 3, peak: 1 }, 1000, false);
     trace.addStep({ ordinal: 2, counter: "counter", device_s: 1, peak: 1 }, 1000);

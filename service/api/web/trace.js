@@ -78,11 +78,14 @@ export class Trace {
     this.steps.push({ ordinal, counter, atS: device_s, peak: height, bornMs: nowMs, onSignal, wasLikely });
   }
 
-  /** Take a "tentative" message of the primary, `counter`: a likely step, or one that is taken back. */
-  addTentative({ status, device_s }, nowMs, counter) {
+  /**
+   * Take a "tentative" message of the primary, `counter`: a likely step, or one that is taken back.
+   * Those that do not pass the thresholds in force are for navigation; at rest they would flicker.
+   */
+  addTentative({ status, device_s, passes = true }, nowMs, counter) {
     const known = this.likely.find(({ atS, goneMs }) => goneMs === null && Math.abs(atS - device_s) <= SAME_S);
     if (status === "retracted" && known) known.goneMs = nowMs;
-    if (status !== "likely" || known) return;
+    if (status !== "likely" || known || !passes) return;
     this.likely.push({ counter, atS: device_s, peak: null, bornMs: nowMs, goneMs: null });
   }
 
