@@ -44,7 +44,7 @@ RECORD: Final = struct.Struct("<BBIH")
 """Of each record in it: a separator, its kind, its second, the bytes of its payload; a byte of check sum ends it."""
 SEPARATOR: Final = 0x1E
 SKIPPED: Final = {26: "ACTIVITY2", 27: "ACTIVITY3"}
-"""Kinds of record that hold acceleration and that actfast 1.3 passes over; pygt3x, which knows them, is under the GPL."""
+"""Kinds of record with acceleration that actfast 1.3 passes over; pygt3x, which knows them, is under the GPL."""
 
 CWA_MAGIC: Final = b"MD"
 ZIP_MAGIC: Final = b"PK"
