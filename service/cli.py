@@ -1,4 +1,4 @@
-"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `evaluate`, `bench`.
+"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `evaluate`, `bench`, `counters`.
 
 Ctrl-C or SIGTERM ends each cleanly with exit code 0; a wrong option, file or port ends it with one line and exit code
 2; no Bluetooth with one line and exit code 3; an evaluation without a single count with exit code 1. Nothing heavy is
@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING, Any
 
 from service import cli_options
 from service.config import Settings
-from service.errors import LinkError, SteplinkError
+from service.errors import LinkError, ParameterError, SteplinkError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from device_sim.bracelet import Bracelet
     from device_sim.gatt import GattBracelet
     from device_sim.source import Source
     from service.evaluation.choices import Found
@@ -74,12 +75,16 @@ async def _demo(options: argparse.Namespace) -> None:
     from service.links.ble import Backend  # noqa: PLC0415
 
     settings = _settings(options)
-    bracelet = _bracelet(options)
-    async with LocalAir() as air, _on_air(air, bracelet, options) as worn, air.central() as central:
+    bracelets = _bracelets(options)
+    async with LocalAir() as air, contextlib.AsyncExitStack() as worn:
+        played = [
+            await worn.enter_async_context(_on_air(air, bracelet, name, options))
+            for name, bracelet in bracelets.items()
+        ]
+        central = await worn.enter_async_context(air.central())
         backend = Backend(scanner=central.scanner, client=central.client)
         await _side_by_side(
-            _serve_with(settings, _supervisor(settings, backend, wanted=None)),
-            _take_off(worn),
+            _serve_with(settings, _supervisor(settings, backend, wanted=None)), *(_take_off(one) for one in played)
         )
 
 
@@ -129,8 +134,8 @@ async def _sim(options: argparse.Namespace) -> None:
     """Put a bracelet on a virtual air, for `steplink serve --air` in another terminal."""
     from device_sim.air_tcp import hosted_air  # noqa: PLC0415
 
-    bracelet = _bracelet(options)
-    async with hosted_air(options.air) as air, _on_air(air, bracelet, options) as played:
+    bracelet = _bracelet(options, options.id)
+    async with hosted_air(options.air) as air, _on_air(air, bracelet, options.name, options) as played:
         print(f"bracelet {bracelet.device_id} is on the air at {options.air}; in another terminal:", flush=True)
         print(f"    steplink serve --air {options.air}", flush=True)
         await played.until_played()
@@ -217,6 +222,19 @@ async def _bench(options: argparse.Namespace) -> None:
     json_file.write_json(output, figures)
 
 
+async def _counters(options: argparse.Namespace) -> None:
+    """Print the counters, or the parameters of one."""
+    from service.counters import describe  # noqa: PLC0415
+    from service.evaluation.tables import aligned  # noqa: PLC0415
+
+    if options.markdown:
+        print(describe.markdown(), end="")
+    elif options.name is None:
+        print(aligned([describe.OVERVIEW, *describe.overview()], left=4))
+    else:
+        print(aligned([describe.PARAMETERS, *describe.parameters(options.name)], left=6))
+
+
 async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
     from service.api.app import create_app  # noqa: PLC0415
     from service.api.server import address, listen, serve  # noqa: PLC0415
@@ -259,37 +277,54 @@ async def _backend(air: str | None) -> Any:  # noqa: ANN401
         yield Backend(scanner=central.scanner, client=central.client)
 
 
-def _on_air(air: Any, bracelet: Any, options: argparse.Namespace) -> GattBracelet:  # noqa: ANN401
+def _on_air(air: Any, bracelet: Bracelet, name: str, options: argparse.Namespace) -> GattBracelet:  # noqa: ANN401
     from device_sim.gatt import Start  # noqa: PLC0415
 
     start = Start.ON_SUBSCRIBE if options.recording or options.once else Start.POWER_ON
-    device: GattBracelet = air.bracelet(bracelet, name=options.name, speed=options.speed, start=start)
+    device: GattBracelet = air.bracelet(bracelet, name=name, speed=options.speed, start=start)
     return device
 
 
-def _bracelet(options: argparse.Namespace) -> Any:  # noqa: ANN401
+def _bracelets(options: argparse.Namespace) -> dict[str, Bracelet]:
+    """Return what is worn, by advertised name: one bracelet, or one on each wrist of the same walker."""
+    if options.wrists == 1:
+        return {options.name: _bracelet(options, options.id)}
+    if options.recording is not None:
+        raise ParameterError("wrists", options.wrists, "a recording is of one wrist: leave --recording out")
+    if (options.name, options.id) != (cli_options.DEFAULT_NAME, cli_options.DEFAULT_ID):
+        raise ParameterError("wrists", options.wrists, "two bracelets have names and ids of their own")
+    wrists = cli_options.WRISTS.items()
+    return {name: _bracelet(options, device, mirrored=place > 0) for place, (device, name) in enumerate(wrists)}
+
+
+def _bracelet(options: argparse.Namespace, device: str, *, mirrored: bool = False) -> Bracelet:
     import time  # noqa: PLC0415
 
     from device_sim.bracelet import Bracelet  # noqa: PLC0415
 
     # Boots count upwards for ever; a simulated bracelet keeps no flash memory, so the clock counts for it.
     return Bracelet(
-        _source(options),
-        device_id=options.id,
+        _source(options, mirrored=mirrored),
+        device_id=device,
         boot=time.time_ns() // BOOT_NS & 0xFFFFFFFF,
         packet_samples=options.packet_samples,
     )
 
 
-def _source(options: argparse.Namespace) -> Source:
+def _source(options: argparse.Namespace, *, mirrored: bool) -> Source:
     from device_sim.source import RecordingSource, WalkerSource  # noqa: PLC0415
+    from service.samples import Sensor  # noqa: PLC0415
 
+    sensors = tuple(Sensor)[: cli_options.SENSORS[options.sensors]]
     if options.recording is None:
-        return WalkerSource(options.walk, seed=options.seed, loop=not options.once)
+        return WalkerSource(options.walk, seed=options.seed, loop=not options.once, sensors=sensors, mirrored=mirrored)
     from service.recordings import read  # noqa: PLC0415
 
     recording = read(options.recording, lsb_per_g=options.lsb_per_g, mapping=_mapping(options))
-    return RecordingSource(recording, loop=not options.once)
+    source = RecordingSource(recording, loop=not options.once, sensors=sensors)
+    if absent := [sensor for sensor in sensors if sensor not in source.sensors]:
+        print(f"steplink: {options.recording} holds nothing of a {' or '.join(absent)}", file=sys.stderr)
+    return source
 
 
 def _mapping(options: argparse.Namespace) -> ColumnMapping | None:
@@ -309,6 +344,7 @@ def _parser() -> argparse.ArgumentParser:
     demo = _command(commands, "demo", _demo, "see it work: a simulated bracelet, its radio and the service in one")
     cli_options.add_settings(demo)
     cli_options.add_bracelet(demo)
+    cli_options.add_wrists(demo)
     serve = _command(commands, "serve", _serve, "run the service")
     cli_options.add_settings(serve)
     cli_options.add_air(serve)
@@ -336,6 +372,9 @@ def _parser() -> argparse.ArgumentParser:
     cli_options.add_evaluation(evaluate)
     bench = _command(commands, "bench", _bench, "measure how fast the counters are")
     cli_options.add_bench(bench)
+    counters = _command(commands, "counters", _counters, "list the counters, or the parameters of one")
+    counters.add_argument("name", metavar="NAME", nargs="?", help="a counter, whose parameters are then listed")
+    counters.add_argument("--markdown", action="store_true", help="print all tables as the guide has them")
     return parser
 
 

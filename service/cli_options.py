@@ -11,6 +11,14 @@ from typing import Final
 
 from service.config import Settings
 
+DEFAULT_ID: Final = "sim-1"
+DEFAULT_NAME: Final = "Steplink"
+WRISTS: Final = {"sim-1": "Left", "sim-2": "Right"}
+"""Name of each of two bracelets, by its id."""
+
+SENSORS: Final = {"accelerometer": 1, "gyroscope": 2, "all": 3}
+"""How many of `service.samples.Sensor` a bracelet has, in that order."""
+
 DEFAULT_AIR: Final = "127.0.0.1:7400"
 DEMO_WALK: Final = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
 
@@ -74,13 +82,32 @@ def add_bracelet(parser: argparse.ArgumentParser) -> None:
         "--speed", type=number(0.01, math.inf), default=1.0, help="device seconds per second (default 1)"
     )
     parser.add_argument("--once", action="store_true", help="play once instead of for ever")
-    parser.add_argument("--name", default="Steplink", help="advertised name, at most 8 bytes (default Steplink)")
-    parser.add_argument("--id", default="sim-1", help="the bracelet's own id, 1–20 bytes (default sim-1)")
+    parser.add_argument("--name", default=DEFAULT_NAME, help="advertised name, at most 8 bytes (default Steplink)")
+    parser.add_argument("--id", default=DEFAULT_ID, help="the bracelet's own id, 1–20 bytes (default sim-1)")
+    parser.add_argument(
+        "--sensors",
+        choices=tuple(SENSORS),
+        default="accelerometer",
+        help="what it measures: acceleration only, angular rate too, or all, the Earth's field with them; of a"
+        " recording, what that has of them (default accelerometer)",
+    )
     parser.add_argument(
         "--packet-samples",
         type=int,
         default=10,
         help="most samples of one packet; 0 fills the MTU, 10 at 50 Hz are 0.2 s (default 10)",
+    )
+
+
+def add_wrists(parser: argparse.ArgumentParser) -> None:
+    """Add on how many wrists a walker wears a bracelet."""
+    parser.add_argument(
+        "--wrists",
+        type=int,
+        choices=(1, 2),
+        default=1,
+        help="bracelets on one synthetic walker's wrists; two are sim-1 Left and sim-2 Right, the same true steps"
+        " (default 1)",
     )
 
 

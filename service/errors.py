@@ -7,7 +7,10 @@
     ├── SnapshotError       a snapshot of another counter, version or parameters
     ├── CounterError        a counter cannot be built: unknown name, or a sensor the device lacks
     ├── LinkError           a link could not be made or was lost; `reason` is a LinkFault
-    └── UnknownDeviceError  no device of that id
+    ├── LearningError       a walk from which a counter's parameters cannot be learnt
+    ├── NotNowError         what was asked for is possible, but not at this moment
+    ├── UnknownDeviceError  no device of that id
+    └── UnknownNumberError  no calibration or trial of that number
 
 Each carries typed fields and a sentence that says what to do. None of them ends a stream: bad input is counted
 and skipped, a lost link is made again.
@@ -89,9 +92,26 @@ class LinkError(SteplinkError):
         self.why = why
 
 
+class LearningError(SteplinkError):
+    """A walk from which a counter's parameters cannot be learnt; it says how to walk."""
+
+
+class NotNowError(SteplinkError):
+    """What was asked for is possible, but not at this moment; it says when."""
+
+
 class UnknownDeviceError(SteplinkError):
     """No device of that id."""
 
     def __init__(self, device: str) -> None:
         super().__init__(f"no device {device!r}: GET /api/v1/devices lists the known ones")
         self.device = device
+
+
+class UnknownNumberError(SteplinkError):
+    """No calibration or trial of that number."""
+
+    def __init__(self, what: str, number: int, where: str) -> None:
+        super().__init__(f"no {what} {number}: GET {where} lists them")
+        self.what = what
+        self.number = number

@@ -23,8 +23,25 @@ TICK_HZ = 1024
 TICK_EVERY = 128
 """A tick is taken at every sample whose index is a multiple of this, so that time does not depend on packet size."""
 
+MIN_RATE_HZ = 10.0
+"""A run has up to 4 steps a second, and its second harmonic tells the feet apart: less is no signal to count."""
+
 Column = Sequence[float] | NDArray[np.float64]
 Columns = tuple[Column, Column, Column]
+
+
+class Sensor(StrEnum):
+    """What a device can measure."""
+
+    ACCELEROMETER = "accelerometer"
+    GYROSCOPE = "gyroscope"
+    MAGNETOMETER = "magnetometer"
+
+
+Sensors = tuple[Sensor, ...]
+"""Sensors of a device or of its samples, in the order of the enumeration; every device has the first."""
+
+ACCELEROMETER_ONLY: Sensors = (Sensor.ACCELEROMETER,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,9 +60,23 @@ class RawBlock:
     acc_g: Columns
     gyro_rad_s: Columns | None = None
     mag_ut: Columns | None = None
+    saturated: Sequence[int] = ()
+    """Which samples, counted from the block's first, hold a value at its limit: the true one is unknown."""
 
     def __len__(self) -> int:
         return len(self.acc_g[0])
+
+    @property
+    def sensors(self) -> Sensors:
+        """What every sample of the block holds."""
+        return _HELD[self.gyro_rad_s is not None, self.mag_ut is not None]
+
+
+_HELD = {
+    (gyro, mag): tuple(sensor for sensor, held in zip(Sensor, (True, gyro, mag), strict=True) if held)
+    for gyro in (False, True)
+    for mag in (False, True)
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,14 +167,7 @@ class DeviceInfo:
     manufacturer: str | None = None
     model: str | None = None
     firmware: str | None = None
-
-
-class Sensor(StrEnum):
-    """What a device can measure."""
-
-    ACCELEROMETER = "accelerometer"
-    GYROSCOPE = "gyroscope"
-    MAGNETOMETER = "magnetometer"
+    sensors: Sensors | None = None
 
 
 # What a Tracker emits. A session adds the device's id, an ordinal to the durable ones, and UTC.
@@ -226,4 +250,11 @@ class Counting:
     cadence_spm: float | None
 
 
-Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gridded:
+    """Never published: the grid samples that the counters were given; a Gap before them has been told."""
+
+    block: SampleBlock
+
+
+Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting | Gridded

@@ -42,7 +42,13 @@ class Device(BaseModel):
     counters: dict[str, int] = Field(
         description="Each counter's own confirmed steps since it began", examples=[{"double_threshold": 128}]
     )
-    counter_faults: dict[str, str] = Field(description="Why a counter does not count: a sensor the device lacks")
+    counter_faults: dict[str, str] = Field(
+        description="Why a counter does not count: a sensor the device lacks or does not send, or under 10 samples a"
+        " second"
+    )
+    sensors: list[str] | None = Field(
+        description="What the device says it measures; null until it has", examples=[["accelerometer", "gyroscope"]]
+    )
     cadence_spm: float | None = Field(description="Steps a minute; null while nobody walks", examples=[108.4])
     battery_percent: int | None = Field(examples=[87])
     rate_hz: float | None = Field(description="Nominal sampling rate", examples=[50.0])
@@ -53,6 +59,7 @@ class Device(BaseModel):
     packets_duplicate: int = Field(description="Packets that held nothing new; skipped")
     samples: int
     samples_lost: int = Field(description="Samples that did not arrive")
+    samples_saturated: int = Field(description="Samples with a value at its limit, counted: the true one is unknown")
     gaps: int
     reboots: int
     manufacturer: str | None
@@ -223,6 +230,9 @@ class CounterModel(BaseModel):
 
     name: str = Field(examples=["double_threshold"])
     sensors: list[str] = Field(examples=[["accelerometer"]])
+    calibrations: list[str] = Field(
+        description="Ways to learn parameters of it from a walk on a device", examples=[["walk", "middle"]]
+    )
     parameters: list[ParameterModel]
 
 

@@ -42,6 +42,7 @@ def device_view(device: Device) -> models.Device:
         steps_now=tracker.steps_now,
         counters=tracker.steps,
         counter_faults=tracker.counter_faults,
+        sensors=None if info.sensors is None else list(info.sensors),
         cadence_spm=tracker.cadence_spm if device.state is State.STREAMING else None,
         battery_percent=info.battery_percent,
         rate_hz=info.rate_hz,
@@ -52,6 +53,7 @@ def device_view(device: Device) -> models.Device:
         packets_duplicate=tally.packets_duplicate,
         samples=tally.samples,
         samples_lost=tally.samples_lost,
+        samples_saturated=tally.samples_saturated,
         gaps=tally.gaps,
         reboots=tally.reboots,
         manufacturer=info.manufacturer,
@@ -124,7 +126,9 @@ def step_view(notice: Notice) -> models.StepEvent:
 def counter_view(kind: CounterKind) -> models.CounterModel:
     """Return a counter of the registry with its parameters."""
     parameters = [_parameter_view(field, kind) for field in dataclasses.fields(kind.params)]
-    return models.CounterModel(name=kind.name, sensors=sorted(kind.sensors), parameters=parameters)
+    return models.CounterModel(
+        name=kind.name, sensors=sorted(kind.sensors), calibrations=list(kind.calibrations), parameters=parameters
+    )
 
 
 def _parameter_view(field: dataclasses.Field[Any], kind: CounterKind) -> models.ParameterModel:

@@ -12,22 +12,26 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Protocol, TypeVar
 
 from service.errors import ParameterError, SnapshotError
-from service.samples import SampleBlock, Update
+from service.samples import SampleBlock, Sensor, Update
 
 Snapshot = dict[str, Any]
 """Plain data (JSON-able): the counter's name, version, a hash of its parameters and its state."""
 
 
 class StepCounter(Protocol):
-    """A streaming step counter; `name`, `version` and `latency_s` are constants of an instance."""
+    """A streaming step counter; `name`, `sensors`, `version` and `latency_s` are constants of an instance."""
 
     @property
     def name(self) -> str:
         """The registry's name of the algorithm."""
+
+    @property
+    def sensors(self) -> Collection[Sensor]:
+        """What a block must hold."""
 
     @property
     def latency_s(self) -> float:
@@ -44,6 +48,14 @@ class StepCounter(Protocol):
 
     def restore(self, state: Snapshot) -> None:
         """Take over a snapshot's state; SnapshotError where it is another counter's."""
+
+
+def lacking(name: str, needed: Collection[Sensor], has: Collection[Sensor]) -> str | None:
+    """Return the sentence that says what the counter `name` needs and the device has not; None where it has all."""
+    missing = [sensor for sensor in Sensor if sensor in needed and sensor not in has]
+    if not missing:
+        return None
+    return f"{name} needs {', '.join(missing)}; the device has {', '.join(sorted(has)) or 'none'}"
 
 
 Params = TypeVar("Params")

@@ -170,18 +170,27 @@ def step_rows(block: SampleBlock, params: DoubleThresholdParams = TUNED) -> NDAr
     return steps
 
 
+def sampling(params: DoubleThresholdParams) -> DoubleThresholdParams:
+    """Return the parameters with which a sampling walk is counted: its window does not move, its first steps count."""
+    return replace(params, window_mode="fixed", credit="retrospective")
+
+
+def mean_window(spacings: Sequence[float], params: DoubleThresholdParams) -> int:
+    """Return the window length (6) of these spacings of valid steps, in samples; `first_window` where there is none."""
+    if not spacings:
+        return params.first_window
+    length = sum(spacings) / len(spacings)
+    return int((length / 2 if length > params.window_limit else length) + 0.5)
+
+
 def sampled_window(block: SampleBlock, params: DoubleThresholdParams) -> int:
     """Return the window length (6) of a sampling walk, in samples; `first_window` where it holds no two steps.
 
     Published mode (a): one walk a person and pace, of a set number of steps or a set time.
     """
-    counter = build(replace(params, window_mode="fixed", credit="retrospective"))
+    counter = build(sampling(params))
     steps = counter.update(block).steps + counter.finish().steps
-    spacings = [step.interval_s * GRID_HZ for step in steps if step.interval_s is not None]
-    if not spacings:
-        return params.first_window
-    length = sum(spacings) / len(spacings)
-    return int((length / 2 if length > params.window_limit else length) + 0.5)
+    return mean_window([step.interval_s * GRID_HZ for step in steps if step.interval_s is not None], params)
 
 
 def middle_window(block: SampleBlock, params: DoubleThresholdParams) -> int:

@@ -227,8 +227,16 @@ def calibrated(block: SampleBlock, params: GyroZeroCrossingParams) -> GyroZeroCr
     extremum, their mean weighted by themselves: the small ones of heel strike and of standing weigh little. What the
     hand does at both ends is left out by start_delay_s and taken_out_s.
     """
-    everything = replace(params, peak_rad_s=0.0, valley_rad_s=0.0, bout=1)
-    extrema = step_rows(block, everything)[:, 2]
+    return passing(step_rows(block, everything(params))[:, 2], params)
+
+
+def everything(params: GyroZeroCrossingParams) -> GyroZeroCrossingParams:
+    """Return the parameters that let every crossing pass, so that its extremum can be learnt from."""
+    return replace(params, peak_rad_s=0.0, valley_rad_s=0.0, bout=1)
+
+
+def passing(extrema: NDArray[np.float64], params: GyroZeroCrossingParams) -> GyroZeroCrossingParams:
+    """Return `params` with the thresholds that the true ones of these extrema (valleys < 0) pass."""
     return replace(
         params,
         peak_rad_s=_threshold(extrema[extrema > 0.0], params.margin, params.peak_rad_s),
@@ -236,11 +244,17 @@ def calibrated(block: SampleBlock, params: GyroZeroCrossingParams) -> GyroZeroCr
     )
 
 
-def _threshold(extrema: NDArray[np.float64], margin: float, otherwise: float) -> float:
+def true_extrema(extrema: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return those of `extrema` (of one sign, as heights) that are swings of the thigh."""
     if len(extrema) == 0:
-        return otherwise
-    typical = float(np.sum(extrema * extrema) / np.sum(extrema))
-    return margin * float(np.min(extrema[extrema >= TRUE_SHARE * typical]))
+        return extrema
+    typical = np.sum(extrema * extrema) / np.sum(extrema)
+    return extrema[extrema >= TRUE_SHARE * typical]
+
+
+def _threshold(extrema: NDArray[np.float64], margin: float, otherwise: float) -> float:
+    true = true_extrema(extrema)
+    return margin * float(np.min(true)) if len(true) else otherwise
 
 
 @cache

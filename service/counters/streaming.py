@@ -83,6 +83,7 @@ class KernelCounter:
         self.name = name
         self.params = params
         self.version = version
+        self.sensors = kernel.sensors
         self.latency_s = latency_s
         self._kernel = kernel
         self._state = state

@@ -21,12 +21,9 @@ from service.counters.streaming import COMPILED_FROM, KernelCounter
 from service.errors import RecordingError
 from service.recordings import Recording, evenly_spaced, stated_rate_hz
 from service.recordings.recording import Floats, median_rate_hz
-from service.samples import Columns, RawBlock, SampleBlock, Sensor, Step
+from service.samples import MIN_RATE_HZ, Columns, RawBlock, SampleBlock, Sensor, Step
 from service.signals.compiled import available
 from service.signals.timebase import Timebase
-
-MIN_RATE_HZ: Final = 10.0
-"""A run has up to 4 steps a second, and its second harmonic tells the feet apart: less is no signal to count."""
 
 WARM_UP_SAMPLES: Final = 64
 """Enough to make numba compile every kernel of a counter."""

@@ -22,10 +22,13 @@ from service.samples import (
     Described,
     DeviceInfo,
     Event,
+    Gridded,
     Packet,
     RawBlock,
     Rebooted,
     Segmented,
+    Sensor,
+    Sensors,
     Signal,
     StepCounted,
     Update,
@@ -33,6 +36,7 @@ from service.samples import (
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
 from service.tracking.doubt import Doubt, index_ahead
+from service.tracking.fitness import Stream, faults
 from service.tracking.tentative import TentativeSteps
 from service.wearables.contract import Wearable
 
@@ -48,6 +52,7 @@ class Tally:
     packets_duplicate: int = 0
     samples: int = 0
     samples_lost: int = 0
+    samples_saturated: int = 0
     gaps: int = 0
     reboots: int = 0
 
@@ -68,7 +73,11 @@ class Tracker:
         """The device's steps when the primary took over, and the primary's own count then."""
         self.last_fault: WireError | None = None
         self.counter_faults: dict[str, str] = {}
-        """Why a counter does not count, as a sentence: a sensor that the device does not send."""
+        """Why a counter does not count, as a sentence: a sensor that the device does not send, or too low a rate."""
+        self._judged: object = None
+        self._held: Sensors | None = None
+        self._measured_hz = 0.0
+        """What the newest block held, and the rate after it."""
         self._wearable = wearable
         self._factories = dict(counters)
         self._counters = {name: make() for name, make in counters.items()}
@@ -102,6 +111,12 @@ class Tracker:
         """The device's sampling rate as its own clock tells it."""
         return self._timebase.measured_rate_hz if self._timebase else None
 
+    @property
+    def stream(self) -> Stream:
+        """What is known of what the device sends."""
+        rates = [rate_hz for rate_hz in (self.info.rate_hz, self.measured_rate_hz) if rate_hz is not None]
+        return Stream(has=self.info.sensors, holds=self._held, rate_hz=min(rates, default=None))
+
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
         said: RawBlock | DeviceInfo | None = None
@@ -130,8 +145,9 @@ class Tracker:
         before = self.total
         self.steps = {name: self.steps[name] if name in kept else 0 for name in counters}
         self._counters = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
-        self.counter_faults = {name: why for name, why in self.counter_faults.items() if name in kept}
         self._factories = dict(counters)
+        self._judged = None
+        self._judge()
         if primary == self.primary and primary in kept:
             return events
         self.primary, self._segment = primary, (before, self.steps[primary])
@@ -169,8 +185,9 @@ class Tracker:
         """Take over a snapshot's state; SnapshotError where its counters are not ours."""
         for uuid, data in state["said"].items():
             self.apply(Packet(characteristic=uuid, data=bytes.fromhex(data), at_ns=0))
-        clock = state["info"]["clock"]
-        self.info = DeviceInfo(**{**state["info"], "clock": clock and (clock[0], clock[1])})
+        info = state["info"]
+        clock, sensors = info["clock"] and tuple(info["clock"]), info["sensors"] and tuple(map(Sensor, info["sensors"]))
+        self.info = DeviceInfo(**{**info, "clock": clock, "sensors": sensors})
         for name, counter in self._counters.items():
             counter.restore(state["counters"][name])
         self.tally = Tally(**state["tally"])
@@ -192,6 +209,7 @@ class Tracker:
         if info == self.info:
             return []
         self.info = info
+        self._judge()
         return [Described(info=info)]
 
     def _receive(self, block: RawBlock) -> list[Event]:
@@ -216,11 +234,16 @@ class Tracker:
         samples, gap = timebase.feed(fresh)
         self._next_index = fresh.index + len(fresh)
         self.tally.samples += len(fresh)
+        self.tally.samples_saturated += len(fresh.saturated)
+        if fresh.sensors is not self._held or timebase.measured_rate_hz != self._measured_hz:
+            self._held, self._measured_hz = fresh.sensors, timebase.measured_rate_hz
+            self._judge()
         if gap is not None:
             self.tally.gaps += 1
             self.tally.samples_lost += gap.samples
             events.append(gap)
-        pending = 0
+        events.append(Gridded(block=samples))
+        pending = self.steps_now - self.total if self.primary in self.counter_faults else 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
             try:
                 update = self._counters[name].update(samples)
@@ -235,6 +258,13 @@ class Tracker:
                     events.append(Signal(from_s=update.trace_from_s, values=update.trace, bands=update.bands))
         events.append(self._counting(pending))
         return events
+
+    def _judge(self) -> None:
+        """Find the counters that cannot count what the device has or sends, where that may have changed."""
+        stream = self.stream
+        judged = (stream.has, stream.holds, stream.too_slow)
+        if judged != self._judged:
+            self._judged, self.counter_faults = judged, faults(self._counters, stream)
 
     def _follow_boot(self, boot: int) -> list[Event]:
         if self._boot == boot:
@@ -266,15 +296,16 @@ class Tracker:
             index = self._next_index + index_ahead(block.index, self._next_index)
         seen = max(0, self._next_index - index) if self._timebase else 0
         if seen == 0:
-            return dataclasses.replace(block, index=index)
+            return block if index == block.index else dataclasses.replace(block, index=index)
         if seen >= len(block):
             return None
         # The tick is of the stretch the block began in; what is left of it may begin in the next.
         same_stretch = index // TICK_EVERY == (index + seen) // TICK_EVERY
-        return RawBlock(
-            boot=block.boot,
+        return dataclasses.replace(
+            block,
             index=index + seen,
             tick=block.tick if same_stretch else None,
+            saturated=[at - seen for at in block.saturated if at >= seen],
             acc_g=_cut(block.acc_g, seen),
             gyro_rad_s=_cut(block.gyro_rad_s, seen) if block.gyro_rad_s else None,
             mag_ut=_cut(block.mag_ut, seen) if block.mag_ut else None,

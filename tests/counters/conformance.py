@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from service.counters.contract import StepCounter
+from service.counters.streaming import COMPILED_FROM
 from service.errors import SnapshotError
 from service.samples import GRID_HZ, Band, SampleBlock, Step, Update
 
@@ -41,6 +42,10 @@ class Signal:
         columns = [np.ascontiguousarray(column) if arrays else column.tolist() for column in part.T]
         acc, gyro, mag = (tuple(columns[i : i + 3]) for i in (0, 3, 6))
         return SampleBlock(start=first + offset, acc_g=acc, gyro_rad_s=gyro, mag_ut=mag)
+
+    def pieces(self) -> list[SampleBlock]:
+        """Return all of it in blocks short enough for plain Python: numba takes seconds to compile a kernel."""
+        return [self.block(first, first + COMPILED_FROM) for first in range(0, len(self), COMPILED_FROM)]
 
 
 @dataclass
@@ -197,7 +202,7 @@ def check_walk(make: Make, step_hz: float, swing_g: float, *, slack: int, moment
     rest = walk(100, step_hz, 0.0)
     moving = walk(round(true_steps / step_hz * GRID_HZ), step_hz, swing_g)
     signal = Signal(np.concatenate([rest, moving, rest]))
-    outcome = collect(make(), [signal.block()], finish=True)
+    outcome = collect(make(), signal.pieces(), finish=True)
     assert abs(len(outcome.steps) - true_steps) <= slack
     at_s = np.array([step.at_s for step in outcome.steps]) - len(rest) / GRID_HZ
     off_s = (at_s - moment / step_hz + 0.5 / step_hz) % (1 / step_hz) - 0.5 / step_hz
@@ -208,7 +213,7 @@ def check_walk_outside(make: Make, step_hz: float, swing_g: float) -> None:
     """A clean walk outside a counter's declared limits is missed, in half or more, and not counted otherwise."""
     true_steps = 40
     signal = Signal(walk(round(true_steps / step_hz * GRID_HZ), step_hz, swing_g))
-    assert len(collect(make(), [signal.block()], finish=True).steps) <= true_steps / 2
+    assert len(collect(make(), signal.pieces(), finish=True).steps) <= true_steps / 2
 
 
 def check_foreign_snapshot(make: Make, others: Iterable[StepCounter]) -> None:

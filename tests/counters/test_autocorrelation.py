@@ -29,7 +29,9 @@ def block_of(norm, start=0):
 
 
 def steps_of(params, norm):
-    return collect(build(params), [block_of(norm)], finish=True).steps
+    """In pieces short enough to go through plain Python: numba would take seconds to compile."""
+    blocks = [block_of(norm[first : first + 1000], start=first) for first in range(0, len(norm), 1000)]
+    return collect(build(params), blocks, finish=True).steps
 
 
 def indices(steps):
@@ -314,7 +316,7 @@ def test_after_a_long_gap_all_is_as_at_the_start():
 
 def test_a_recording_shorter_than_a_step_has_none():
     for n in (1, 5, 2 * TUNED.t_min - 1):
-        assert build(TUNED).count(block_of(even(n, 20))).shape == (0, kernel.ROW)
+        assert steps_of(TUNED, even(n, 20)) == []
 
 
 def test_a_nan_costs_the_periods_that_hold_it_and_no_more():
@@ -339,6 +341,7 @@ def test_a_sensor_without_gravity_or_with_a_large_offset_counts_the_same():
     assert indices(steps_of(PAPER, norm + 7.0)) == indices(steps_of(PAPER, norm))
 
 
+@pytest.mark.full  # numba takes seconds to compile the kernel
 def test_count_gives_what_update_and_finish_give():
     signal = Signal(walk(COMPILED_FROM + 900, 1.9, 0.4))
     counter = build(TUNED)

@@ -69,10 +69,17 @@ def test_no_step_in_a_gap(make, signal, share, gap):
     conformance.check_gap(make, signal, round(share * (len(signal) - 1)), gap)
 
 
+@pytest.mark.full  # numba takes seconds to compile each kernel
 @settings(max_examples=8, deadline=None)
 @given(signal=signals(), samples=st.integers(2100, 6000))
 def test_a_long_block_equals_packets(make, signal, samples):
     conformance.check_long_block(make, signal, samples)
+
+
+@settings(max_examples=4, deadline=None)
+@given(signal=signals(), samples=st.integers(2100, 6000))
+def test_a_long_block_of_the_default_counter_equals_packets(signal, samples):
+    conformance.check_long_block(partial(registry.make, registry.DEFAULT), signal, samples)
 
 
 @few

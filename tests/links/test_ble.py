@@ -73,7 +73,7 @@ async def test_a_lost_link_says_so():
 
 async def test_a_silent_link_is_dropped(monkeypatch):
     monkeypatch.setattr(ble, "SILENCE_S", 0.2)
-    async with on_air() as (gatt, sighting, backend), link_to(sighting, backend) as link:
+    async with on_air(speed=8) as (gatt, sighting, backend), link_to(sighting, backend) as link:
         await take(link, 12)
         gatt.silence()
         with pytest.raises(LinkError) as silent:

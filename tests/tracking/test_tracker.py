@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described
+from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described, tick_at
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -153,7 +153,7 @@ def flipped(data, offset, bit):
     return mask
 
 
-OURS = [wire.DATA, wire.CLOCK, wire.RATE, wire.SCALE, wire.BOOT, wire.DEVICE_ID]
+OURS = [wire.DATA, wire.CLOCK, wire.RATE, wire.SCALE, wire.BOOT, wire.DEVICE_ID, wire.SENSORS]
 
 
 @given(values=st.lists(st.tuples(st.sampled_from(OURS), st.binary(max_size=60)), max_size=20), at=st.integers(0, 20))
@@ -231,7 +231,7 @@ def test_samples_before_the_rate_are_bad_packets():
 
 
 class GyroscopeCounter(MetronomeCounter):
-    """A counter that needs what the device does not send."""
+    """A counter that needs what the device does not send, and says it late."""
 
     def update(self, block):
         raise CounterError(f"needs a gyroscope, not {len(block)} samples of acceleration")
@@ -244,6 +244,18 @@ def test_a_counter_without_its_sensor_says_so_and_the_others_count_on():
     run(plain, data_packets([10] * 10))
     assert tracker.counter_faults == {"gyroscope": "needs a gyroscope, not 10 samples of acceleration"}
     assert tracker.steps == {**plain.steps, "gyroscope": 0}
+
+
+def test_samples_at_their_limit_are_counted_once():
+    def packet(index, values):
+        counts = [(value, 0, 4096) for value in values]
+        sent = wire.DataPacket(boot=1, index=index, tick=tick_at(index), counts=counts)
+        return Packet(characteristic=wire.DATA, data=wire.encode(sent), at_ns=0)
+
+    tracker = ready()
+    run(tracker, [packet(0, [0, 99_999, 0, -99_999]), packet(2, [0, -99_999, 32_766, 32_767])])
+    assert tracker.tally.samples == 6
+    assert tracker.tally.samples_saturated == 3
 
 
 def test_a_device_is_described_once_a_change():
