@@ -9,6 +9,7 @@ and `atan2`.
 from __future__ import annotations
 
 from math import sqrt
+from typing import Final
 
 from service.counters.fusion_ahead import coming_peaks
 from service.counters.fusion_checks import (
@@ -38,6 +39,7 @@ from service.counters.fusion_state import (
     KIND,
     LAGS,
     LATEST,
+    MATCHED,
     MAX_STEP,
     MOTION,
     NEVER,
@@ -47,6 +49,7 @@ from service.counters.fusion_state import (
     PEAK,
     PEAK_AT,
     PEAK_VALUE,
+    PERIOD,
     PREVIOUS,
     RAW,
     REJECT,
@@ -66,6 +69,9 @@ from service.counters.fusion_steps import end_bout, take_pair
 from service.samples import Likely
 from service.signals.orientation import advance, horizontal
 from service.signals.orientation import begin as begin_orientation
+
+SWING_REJECT: Final = 0.5
+"""(5): a half-step by the swing is no guess that a bump can have spoilt, so the share need not be milder."""
 
 
 def begin(
@@ -89,7 +95,8 @@ def begin(
     s[A1] = s[A2] = norm
     s[VALLEY_VALUE] = NEVER
     _forget(s)
-    s[PREVIOUS] = s[BEFORE_LAST] = -1.0
+    s[PREVIOUS] = s[BEFORE_LAST] = s[MATCHED] = -1.0
+    s[PERIOD] = 0.0
     begin_orientation(s, ORIENTATION, ax, ay, az, mx, my, mz)
     first = (ax, ay, az, gx, gy, gz, mx, my, mz)
     for axis in range(AXES):
@@ -216,13 +223,20 @@ def _extremum(s: State, kind: float, at: float, value: float, out: State, rows: 
     if s[KIND] == 0.0:
         since = s[HALF]
     else:
-        if since <= s[REJECT] * s[HALF] and since <= s[LATEST]:
+        if since <= _too_soon(s, at) and since <= s[LATEST]:
             return rows
         rows = _final(s, int(at), out, rows)
         s[BEFORE], s[HALF] = s[AT], since
     s[KIND], s[AT], s[VALUE] = kind, at, value
     s[DUE] = at + s[UPDATE] * since
     return rows
+
+
+def _too_soon(s: State, at: float) -> float:
+    """Return th_s (5), from the swing's time of a step where it is known: then the share is the printed one."""
+    if s[PERIOD] > 0.0 and at - s[PREVIOUS] < s[MAX_STEP]:
+        return SWING_REJECT * 0.5 * s[PERIOD]
+    return s[REJECT] * s[HALF]
 
 
 def _final(s: State, now: int, out: State, rows: int) -> int:
