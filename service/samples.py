@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +65,7 @@ class SampleBlock:
         return len(self.acc_g[0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class Step(NamedTuple):
     """One counted step.
 
     `at_s` is device time after boot, the filter's delay removed. `interval_s` is the time since the previous step of
@@ -82,8 +82,7 @@ class Step:
     lower: float | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Band:
+class Band(NamedTuple):
     """Both thresholds in force over a window of device time, for the plot."""
 
     from_s: float
@@ -92,13 +91,12 @@ class Band:
     lower: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Update:
+class Update(NamedTuple):
     """What a counter says after a block: steps now certain, how many more are likely, and its view for the plot.
 
     `likely` names the pending steps where the counter can tell them apart; those it names no more and has not confirmed
     are retracted. `trace` holds the filtered signal, one value a sample of the block, the first at device time
-    `trace_from_s`.
+    `trace_from_s`. A tuple, since one is made a packet and counter, and a frozen dataclass takes twice as long to make.
     """
 
     steps: tuple[Step, ...] = ()
