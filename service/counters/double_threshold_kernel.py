@@ -133,7 +133,8 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
             now = rising if go_on and value == before else 0.0
         if now != rising:
             k = first + i
-            rows = _take(s, k, out, rows)
+            if s[RIPE] < k or s[CLOSE_AT] < k:
+                rows = _take(s, k, out, rows)
             s[RIPE] = k + half - 1.0 if now + rising == 0.0 and k - s[SINCE] >= half else NEVER
             s[RISING], s[SINCE], s[TURN] = now, k, before
             rising = now
@@ -216,24 +217,26 @@ def _take(s: State, k: float, out: State, rows: int) -> int:
     ripe = s[RIPE]
     while s[CLOSE_AT] < k:
         if ripe <= s[CLOSE_AT]:
-            rows, ripe = _extremum(s, out, rows), NEVER
+            rows, ripe = _extremum(s, s[SINCE] - 1.0, out, rows), NEVER
         rows = _close_window(s, s[CLOSE_AT] - s[HALF], out, rows)
-    return _extremum(s, out, rows) if ripe < k else rows
+    if ripe < k:
+        return _extremum(s, s[SINCE] - 1.0, out, rows)
+    return rows
 
 
-def _extremum(s: State, out: State, rows: int) -> int:
-    """Take the peak or valley before the run."""
+def _extremum(s: State, at: float, out: State, rows: int) -> int:
+    """Take the peak or valley before the run; none counts before the mean (5) is full."""
     s[RIPE] = NEVER
-    if s[RISING] < 0.0:
-        _peak(s, s[SINCE] - 1.0, s[TURN])
+    if at < s[FIRST] + WARM_UP:
         return rows
-    return _valley(s, s[SINCE] - 1.0, s[TURN], out, rows)
+    if s[RISING] > 0.0:
+        return _valley(s, at, s[TURN], out, rows)
+    _peak(s, at, s[TURN])
+    return rows
 
 
 def _peak(s: State, at: float, value: float) -> None:
     """Add a peak to the window's mean and to the queue."""
-    if at < s[FIRST] + WARM_UP:
-        return
     s[PEAK_SUM] += value
     s[PEAKS] += 1.0
     s[COUNT] += 1.0
@@ -247,8 +250,6 @@ def _peak(s: State, at: float, value: float) -> None:
 
 def _valley(s: State, at: float, value: float, out: State, rows: int) -> int:
     """Add a valley to the window's mean and show it to the peaks that wait for one."""
-    if at < s[FIRST] + WARM_UP:
-        return rows
     s[VALLEY_SUM] += value
     s[VALLEYS_SEEN] += 1.0
     q, end = int(s[YOUNGEST]), QUEUE + int(s[CAPACITY]) * ENTRY
