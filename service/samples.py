@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,8 +96,7 @@ class SampleBlock:
         return len(self.acc_g[0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class Step(NamedTuple):
     """One counted step.
 
     `at_s` is device time after boot, the filter's delay removed. `interval_s` is the time since the previous step of
@@ -113,8 +113,7 @@ class Step:
     lower: float | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Band:
+class Band(NamedTuple):
     """Both thresholds in force over a window of device time, for the plot."""
 
     from_s: float
@@ -127,13 +126,13 @@ Likely = tuple[float, float, bool]
 """A step that may come: device time, strength, whether it passes what is in force. Confirmed, it has the same time."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Update:
+class Update(NamedTuple):
     """What a counter says after a block: steps now certain, how many more are likely, and its view for the plot.
 
     `likely` names every peak that can still become a step, where the counter can tell them apart; one it names no more
     and has not confirmed is retracted. `pending` counts those of them that pass what is in force. `trace` holds the
-    filtered signal, one value a sample of the block, the first at device time `trace_from_s`.
+    filtered signal, one value a sample of the block, the first at device time `trace_from_s`. A tuple, since one is
+    made a packet and counter, and a frozen dataclass takes twice as long to make.
     """
 
     steps: tuple[Step, ...] = ()

@@ -68,11 +68,11 @@ from service.samples import GRID_HZ, Band, SampleBlock, Step
 FILTER_DELAY: Final = 2
 """Samples by which the five-point mean lags."""
 
+VERSION: Final = 2
+"""Of the state: 1 kept the length of a run, 2 keeps where it began."""
+
 MOVING_SAMPLES: Final = 300
 """Samples a window length is taken from (section 2.3)."""
-
-NO_RUN: Final = 1e300
-"""Longer than any run of rises or falls."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,6 +144,7 @@ def build(params: DoubleThresholdParams = TUNED) -> KernelCounter:
         room=lambda n: _out_length(n, params),
         events=_events,
         latency_s=_latency_s(params),
+        version=VERSION,
     )
 
 
@@ -205,7 +206,7 @@ def _fresh_state(p: DoubleThresholdParams) -> list[float]:
     s = [0.0] * (kernel.QUEUE + capacity * kernel.ENTRY)
     s[kernel.Y_WEIGHT] = 1.0 if p.axes == "norm" else 0.0
     s[kernel.HALF] = float(p.half_width)
-    s[kernel.TIES] = 0.0 if p.ties == "go_on" else NO_RUN
+    s[kernel.GO_ON] = 1.0 if p.ties == "go_on" else 0.0
     s[kernel.VALLEYS] = float(p.valleys)
     s[kernel.WAIT] = float(p.valley_wait)
     s[kernel.REST] = p.rest_raw / p.lsb_per_g
@@ -227,8 +228,8 @@ def _capacity(p: DoubleThresholdParams) -> int:
 
 
 def _out_length(n: int, p: DoubleThresholdParams) -> int:
-    """Floats that n samples and their rows may take: rows come of waiting peaks, new peaks and closed windows."""
-    return n + kernel.ROW * (_capacity(p) + kernel.HELD_MAX + n // 2 + 2)
+    """Floats that n samples, their turns and rows may take: rows come of waiting peaks, new peaks, closed windows."""
+    return 2 * n + kernel.ROW * (_capacity(p) + kernel.HELD_MAX + n // 2 + 2)
 
 
 def _events(rows: Sequence[float]) -> tuple[tuple[Step, ...], tuple[Band, ...]]:
@@ -237,21 +238,8 @@ def _events(rows: Sequence[float]) -> tuple[tuple[Step, ...], tuple[Band, ...]]:
     for i in range(0, len(rows), kernel.ROW):
         kind, a, b, c, d, e, f = rows[i : i + kernel.ROW]
         if kind == kernel.STEP:
-            steps.append(_step(a, b, c, d, e, f))
+            interval_s = b / GRID_HZ if b > 0.0 else None
+            steps.append(Step((a - FILTER_DELAY) / GRID_HZ, c - d, interval_s, c, d, e, f))
         else:
-            bands.append(
-                Band(from_s=(a - FILTER_DELAY) / GRID_HZ, to_s=(b + 1 - FILTER_DELAY) / GRID_HZ, upper=c, lower=d)
-            )
+            bands.append(Band((a - FILTER_DELAY) / GRID_HZ, (b + 1 - FILTER_DELAY) / GRID_HZ, c, d))
     return tuple(steps), tuple(bands)
-
-
-def _step(at: float, spacing: float, peak: float, valley: float, upper: float, lower: float) -> Step:
-    return Step(
-        at_s=(at - FILTER_DELAY) / GRID_HZ,
-        interval_s=spacing / GRID_HZ if spacing > 0.0 else None,
-        strength=peak - valley,
-        peak=peak,
-        valley=valley,
-        upper=upper,
-        lower=lower,
-    )

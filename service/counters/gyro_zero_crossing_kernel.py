@@ -119,7 +119,8 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
     gain, a1, a2, b1, b2, c1, c2 = s[GAIN], s[A], s[A + 1], s[A + 2], s[A + 3], s[A + 4], s[A + 5]
     p1, p2, q1, q2, r1, r2 = s[FILTER], s[FILTER + 1], s[FILTER + 2], s[FILTER + 3], s[FILTER + 4], s[FILTER + 5]
     chosen = s[CHOSEN]
-    rate, bias = _column(x, y, z, chosen), s[BIAS + int(chosen)]
+    rate = x if chosen == 0.0 else y if chosen == 1.0 else z
+    bias = s[BIAS + int(chosen)]
     last, candidate, swept, k, look = s[FILTERED], s[CANDIDATE], s[SWEPT], s[NEXT], s[LOOK]
     due, rows = s[DUE], n
     for i in range(n):
@@ -127,7 +128,8 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
         q = p + p1 + p1 + p2 - b1 * q1 - b2 * q2
         r = q + q1 + q1 + q2 - c1 * r1 - c2 * r2
         filtered = r + r1 + r1 + r2
-        p1, p2, q1, q2, r1, r2 = p, p1, q, q1, r, r1
+        p2, q2, r2 = p1, q1, r1
+        p1, q1, r1 = p, q, r
         out[i] = filtered
         if candidate * (last - filtered) > 0.0:
             candidate, rows = _extremum(s, k, last, swept, out, rows)
@@ -147,7 +149,7 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
             rows = _look(s, k, x[i], y[i], z[i], out, rows)
             if s[CHOSEN] != chosen or filtered != filtered:  # noqa: PLR0124  # NaN would stay in the filter
                 chosen = s[CHOSEN]
-                rate = _column(x, y, z, chosen)
+                rate = x if chosen == 0.0 else y if chosen == 1.0 else z
                 p1 = p2 = q1 = q2 = r1 = r2 = last = candidate = swept = 0.0
                 _restart(s, k + 1.0)
             bias = s[BIAS + int(chosen)]
@@ -194,12 +196,6 @@ def likely(s: State) -> list[Likely]:
         past = s[FILTERED] > s[PEAK_THRESHOLD] if s[CANDIDATE] > 0.0 else s[FILTERED] < s[VALLEY_THRESHOLD]
         found.append((s[CROSSED], abs(s[FILTERED]), past))
     return found
-
-
-def _column(x: Floats, y: Floats, z: Floats, chosen: float) -> Floats:
-    if chosen == 0.0:
-        return x
-    return y if chosen == 1.0 else z
 
 
 def _restart(s: State, index: float) -> None:

@@ -113,7 +113,8 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
         a, b, c = x[i], y[i], z[i]
         m = sqrt(a * a + b * b + c * c)
         value = w0 * m + w1 * m1 + w2 * m2 + w3 * m3 + w4 * m4
-        m1, m2, m3, m4 = m, m1, m2, m3
+        m4, m3, m2 = m3, m2, m1
+        m1 = m
         out[i] = value
         s[place] = value
         place += 1

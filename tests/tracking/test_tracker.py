@@ -1,7 +1,6 @@
 """The Tracker: a pure fold over packets. Bad, repeated, late and absent ones are counted, and none stops it."""
 
 import json
-from dataclasses import replace
 
 import pytest
 from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described, tick_at
@@ -285,7 +284,7 @@ class Foresight(MetronomeCounter):
         update = super().update(block)
         ahead = [k / GRID_HZ for k in range(self._next, self._next + 10) if k % EVERY == 0]
         false = [1.3] if 1.0 <= self._next / GRID_HZ < 1.5 else []
-        return replace(update, likely=[(at_s, 0.5, True) for at_s in (*ahead, *false)])
+        return update._replace(likely=[(at_s, 0.5, True) for at_s in (*ahead, *false)])
 
 
 def test_likely_steps_are_told_then_confirmed_or_retracted():
@@ -310,7 +309,7 @@ class Half(MetronomeCounter):
 
     def update(self, block):
         update = super().update(block)
-        return replace(update, steps=tuple(step for step in update.steps if round(step.at_s * 2) % 2 == 0))
+        return update._replace(steps=tuple(step for step in update.steps if round(step.at_s * 2) % 2 == 0))
 
 
 def test_counters_run_side_by_side_on_one_stream():
