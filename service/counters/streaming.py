@@ -109,7 +109,7 @@ class KernelCounter:
         columns = self._columns(block)
         n = len(columns[0])
         if n == 0:
-            return Update(pending=kernel.pending(self._state), likely=self._likely())
+            return Update(pending=kernel.pending(self._state), likely=self._likely() or ())
         rows = [] if block.start == self._state[kernel.next_index] else self._open(block.start, columns)
         if n > COMPILED_FROM:
             signal, more = np.empty(n), _Rows(n, kernel.row)
