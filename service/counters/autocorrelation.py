@@ -72,7 +72,9 @@ GRAVITY_M_S2: Final = 9.80665
 SHORTEST_STRIDE: Final = 30
 """Samples: 3⅓ steps a second, as t_min has it for a step."""
 
-AS_ZEE: Final = "Zee has t_min=40, t_max=100, lock=10"
+TOO_SHORT: Final = (
+    f"what repeats in fewer than {SHORTEST_STRIDE} samples is one step, not two: Zee has t_min=40, t_max=100, lock=10"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,10 +96,7 @@ class AutocorrelationParams:
         """Check that periods are what they are read as; ParameterError names what contradicts what."""
         ordered(self, "t_min", "t_max", equal=True)
         if self.period == "stride" and self.t_min < SHORTEST_STRIDE:
-            why = (
-                f"needs a t_min of {SHORTEST_STRIDE} samples or more, and it is {self.t_min}: what repeats sooner is a"
-            )
-            raise ParameterError("period", self.period, f"{why} step and would count twice. {AS_ZEE}")
+            raise ParameterError("period", self.period, f"t_min is {self.t_min}, and {TOO_SHORT}")
         spacing = -(-self.t_max // self.period_steps)
         if spacing > self.patience:
             why = f"its steps may lie {spacing} samples apart, and patience, which ends a bout, is {self.patience}"
