@@ -1,7 +1,7 @@
 """Every error steplink raises on purpose; the tree is this page.
 
     SteplinkError
-    ├── ParameterError      a counter's or command's parameter is unknown, of the wrong type or out of range
+    ├── ParameterError      a counter's or command's parameter is unknown, wrong, out of range or against another
     ├── RecordingError      a file is no recording: wrong shape, missing columns, NaN, an unknown format
     ├── WireError           bytes from a device that are no valid packet; `reason` says which rule they break
     ├── SnapshotError       a snapshot of another counter, version or parameters
@@ -26,7 +26,7 @@ class SteplinkError(Exception):
 
 
 class ParameterError(SteplinkError):
-    """A parameter is unknown, of the wrong type or out of range."""
+    """A parameter is unknown, of the wrong type, out of range or in contradiction to another."""
 
     def __init__(self, name: str, value: object, why: str) -> None:
         super().__init__(f"{name} = {value!r}: {why}")

@@ -74,7 +74,8 @@ def add_counter_routes(app: FastAPI, supervisor: Supervisor) -> None:
         """Let these counters run from now on; another primary begins a new segment, and `steps` goes on.
 
         Refused where the device is known to lack a sensor that the primary needs; the others wait for it, and
-        `counter_faults` of the device says so.
+        `counter_faults` of the device says so. Refused too where parameters are out of range or contradict each other;
+        a refusal changes nothing.
         """
         device = supervisor.device(id)
         choices = [

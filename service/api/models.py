@@ -9,7 +9,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, Strict
 
 from service.pipeline.lifecycle import State
 
@@ -262,7 +262,7 @@ class ChoiceModel(BaseModel):
 
     name: str = Field(examples=["double_threshold"])
     preset: str = Field(default="tuned", description="paper or tuned")
-    params: dict[str, float | str] = Field(default_factory=dict, examples=[{"rest_raw": 4.0}])
+    params: dict[str, Annotated[float, Strict()] | str] = Field(default_factory=dict, examples=[{"rest_raw": 4.0}])
 
 
 class LineupModel(BaseModel):

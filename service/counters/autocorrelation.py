@@ -22,7 +22,8 @@ and the best t is the period; ρ above 0.7 is a step. Unfiltered: the trace is t
 
 `STRIDE` reads the period as Zee does, the paper's reference 10 (Rai et al., MobiCom 2012): 40–100 samples, two steps
 each, ±10 once locked. It fits arm and pocket, where every second step is alike; a running stride is shorter than 40
-samples and is then counted once in two, which is the paper's 50 %.
+samples and is then counted once in two, which is the paper's 50 %. It needs a t_min of 30 or more: among shorter lags
+are steps, and each would count twice.
 
 Ours, where the text is silent: (1) is causal, the newest sample ending the later of its two windows. A step is the
 highest sample of its part of the period. The next period judged is centred on where the next steps should be, so a
@@ -61,12 +62,19 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from service.counters import autocorrelation_kernel as kernel
-from service.counters.contract import choice, parameter
+from service.counters.contract import choice, ordered, parameter
 from service.counters.streaming import Kernel, KernelCounter
 from service.errors import ParameterError
 from service.samples import GRID_HZ, Band, Step
 
 GRAVITY_M_S2: Final = 9.80665
+
+SHORTEST_STRIDE: Final = 30
+"""Samples: 3⅓ steps a second, as t_min has it for a step."""
+
+TOO_SHORT: Final = (
+    f"what repeats in fewer than {SHORTEST_STRIDE} samples is one step, not two: Zee has t_min=40, t_max=100, lock=10"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +91,21 @@ class AutocorrelationParams:
     patience: int = parameter(100, unit="samples", low=50, high=500, text="a bout ends this long after its last step")
     bout: int = parameter(1, unit="steps", low=1, high=kernel.HELD_MAX, text="steps that make a bout certain")
     credit: str = choice("never", options=("never", "retrospective"), text="whether the steps before that count")
+
+    def __post_init__(self) -> None:
+        """Check that periods are what they are read as; ParameterError names what contradicts what."""
+        ordered(self, "t_min", "t_max", equal=True)
+        if self.period == "stride" and self.t_min < SHORTEST_STRIDE:
+            raise ParameterError("period", self.period, f"t_min is {self.t_min}, and {TOO_SHORT}")
+        spacing = -(-self.t_max // self.period_steps)
+        if spacing > self.patience:
+            why = f"its steps may lie {spacing} samples apart, and patience, which ends a bout, is {self.patience}"
+            raise ParameterError("t_max", self.t_max, why)
+
+    @property
+    def period_steps(self) -> int:
+        """Steps in a period."""
+        return 2 if self.period == "stride" else 1
 
 
 PAPER: Final = AutocorrelationParams()
@@ -107,13 +130,11 @@ _KERNEL: Final = Kernel(
 
 
 def build(params: AutocorrelationParams = TUNED) -> KernelCounter:
-    """Return the autocorrelation counter; its unit is g. ParameterError where no lag lies in [t_min, t_max].
+    """Return the autocorrelation counter; its unit is g.
 
     >>> build(PAPER).latency_s
     1.75
     """
-    if params.t_min > params.t_max:
-        raise ParameterError("t_min", params.t_min, f"at most t_max, {params.t_max} samples")
     return KernelCounter(
         "autocorrelation",
         params,
@@ -140,7 +161,7 @@ def _latency_s(p: AutocorrelationParams) -> float:
 def _fresh_state(p: AutocorrelationParams) -> list[float]:
     length = int(kernel.PERIODS * p.t_max)
     s = [0.0] * (kernel.RING + 2 * length)
-    s[kernel.N] = 2.0 if p.period == "stride" else 1.0
+    s[kernel.N] = float(p.period_steps)
     s[kernel.T_MIN], s[kernel.T_MAX] = float(p.t_min), float(p.t_max)
     s[kernel.LOCK] = float(p.lock)
     s[kernel.IDLE] = (p.idle / GRAVITY_M_S2) * (p.idle / GRAVITY_M_S2)

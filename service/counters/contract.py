@@ -75,8 +75,22 @@ def choice(default: str, *, options: tuple[str, ...], text: str) -> Any:  # noqa
     return dataclasses.field(default=default, metadata={"options": options, "text": text})
 
 
+def ordered(params: object, lower: str, higher: str, *, equal: bool = False) -> None:
+    """Raise ParameterError, which names both, unless `lower` is less than `higher` (or `equal` to it, where allowed).
+
+    For the `__post_init__` of a counter's parameters, where they may contradict each other.
+    """
+    low, high = getattr(params, lower), getattr(params, higher)
+    if low > high or (low == high and not equal):
+        unit = {f.name: f for f in dataclasses.fields(params)}[higher].metadata["unit"]  # type: ignore[arg-type]
+        raise ParameterError(lower, low, f"{'at most' if equal else 'less than'} {higher}, which is {high:g} {unit}")
+
+
 def with_overrides(params: Params, overrides: Mapping[str, object]) -> Params:
-    """Return `params` with `overrides` (values or their text), each checked; ParameterError says what is wrong."""
+    """Return `params` with `overrides` (values or their text), each checked, then all together.
+
+    ParameterError says what is wrong, or which two contradict each other.
+    """
     fields = {f.name: f for f in dataclasses.fields(params)}  # type: ignore[arg-type]
     changed: dict[str, object] = {}
     for name, value in overrides.items():

@@ -63,6 +63,7 @@ from numpy.typing import NDArray
 from service.counters import double_threshold_kernel as kernel
 from service.counters.contract import choice, parameter
 from service.counters.streaming import Kernel, KernelCounter
+from service.errors import ParameterError
 from service.samples import GRID_HZ, Band, SampleBlock, Step
 
 FILTER_DELAY: Final = 2
@@ -70,6 +71,9 @@ FILTER_DELAY: Final = 2
 
 VERSION: Final = 2
 """Of the state: 1 kept the length of a run, 2 keeps where it began."""
+
+MOST_REST_G: Final = 16.0
+"""No step is larger: with more, all would be rest."""
 
 MOVING_SAMPLES: Final = 300
 """Samples a window length is taken from (section 2.3)."""
@@ -94,6 +98,13 @@ class DoubleThresholdParams:
     window_mode: str = choice("moving", options=("moving", "fixed"), text="window length from the last steps, or fixed")
     first_window: int = parameter(30, unit="samples", low=5, high=150, text="first (or fixed) window length")
     window_limit: int = parameter(60, unit="samples", low=20, high=150, text="a longer mean spacing is halved")
+
+    def __post_init__(self) -> None:
+        """Check that not everything is rest; ParameterError names what contradicts what."""
+        most = MOST_REST_G * self.lsb_per_g
+        if self.rest_raw > most:
+            why = f"at most {most:g}, {MOST_REST_G:g} g, where lsb_per_g is {self.lsb_per_g:g}"
+            raise ParameterError("rest_raw", self.rest_raw, why)
 
     @property
     def longest_window(self) -> int:

@@ -92,7 +92,7 @@ from numpy.typing import NDArray
 
 from service.counters import fusion_kernel as kernel
 from service.counters import fusion_state as state
-from service.counters.contract import choice, parameter
+from service.counters.contract import choice, ordered, parameter
 from service.counters.streaming import Events, Kernel, KernelCounter
 from service.samples import GRID_HZ, SampleBlock, Sensor, Step
 
@@ -131,6 +131,10 @@ class FusionParams:
     suspect_share: float = parameter(0.6, unit="of the mean", low=0, high=9, text="a suspect step goes farther")
     first_suspects: str = choice("pass", options=("pass", "fail"), text="what suspects among the first three do")
     bout: int = parameter(1, unit="steps", low=1, high=12, text="steps that make a walk certain; all of them count")
+
+    def __post_init__(self) -> None:
+        """Check that a half-step is shorter than a step; ParameterError names what contradicts what."""
+        ordered(self, "longest_half", "longest_step")
 
 
 PAPER: Final = FusionParams()

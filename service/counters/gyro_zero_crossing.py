@@ -88,7 +88,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.counters import gyro_zero_crossing_kernel as kernel
-from service.counters.contract import choice, parameter
+from service.counters.contract import choice, ordered, parameter
 from service.counters.streaming import Kernel, KernelCounter
 from service.samples import GRID_HZ, Band, SampleBlock, Sensor, Step
 
@@ -136,6 +136,10 @@ class GyroZeroCrossingParams:
     margin: float = parameter(
         0.8, unit="of it", low=0.1, high=1, text="calibration: threshold from the smallest extremum"
     )
+
+    def __post_init__(self) -> None:
+        """Check that two crossings can follow each other; ParameterError names what contradicts what."""
+        ordered(self, "refractory_s", "max_spacing_s")
 
 
 PAPER: Final = GyroZeroCrossingParams()

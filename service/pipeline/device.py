@@ -59,8 +59,8 @@ class Device:
     def count_with(self, lineup: Lineup) -> None:
         """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
         registry.require_sensors(lineup.primary, self.session.tracker.info.sensors)
-        self.lineup = lineup
         self.session.change_counters(lineup)
+        self.lineup = lineup
 
     def require_streaming(self) -> None:
         """Raise NotNowError unless the device streams."""

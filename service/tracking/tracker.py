@@ -141,15 +141,16 @@ class Tracker:
     def change_counters(self, counters: Mapping[str, CounterFactory], *, primary: str) -> list[Event]:
         """Go on with other counters: equal ones as they are, the others afresh from the next sample on.
 
-        Another primary, or other parameters of it, begin a new segment of the device's count.
+        Another primary, or other parameters of it, begin a new segment of the device's count. Where a counter cannot be
+        built its error is raised, and nothing has changed.
         """
         kept = {name for name, make in counters.items() if self._factories.get(name) == make}
+        running = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
         dropped = [name for name in self._counters if name not in kept]
         events = [event for name in dropped for event in self._take(name, self._counters[name].finish())]
         before = self.total
         self.steps = {name: self.steps[name] if name in kept else 0 for name in counters}
-        self._counters = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
-        self._factories = dict(counters)
+        self._counters, self._factories = running, dict(counters)
         self._judged = None
         self._judge()
         if primary == self.primary and primary in kept:

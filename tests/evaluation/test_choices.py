@@ -33,6 +33,7 @@ def test_parameters_go_to_their_counter():
         (["double_threshold"], "tuned", ["bout=3"], ParameterError, "NAME.KEY=V"),
         (["double_threshold"], "tuned", ["double_threshold.bout"], ParameterError, "NAME.KEY=V"),
         (["double_threshold"], "tuned", [".bout=3"], ParameterError, "NAME.KEY=V"),
+        (["autocorrelation"], "tuned", ["autocorrelation.period=stride"], ParameterError, "t_min"),
     ],
 )
 def test_what_is_wrong_is_said(names, preset, params, error, said):

@@ -7,7 +7,7 @@ from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described,
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.errors import CounterError
+from service.errors import CounterError, ParameterError
 from service.samples import (
     GRID_HZ,
     Counting,
@@ -333,6 +333,23 @@ def test_another_primary_begins_a_segment_and_the_count_goes_on():
     tracker.change_counters({"metronome": MetronomeCounter, "half": Half}, primary="metronome")
     run(tracker, data_packets([10] * 10, start=200))
     assert tracker.total == 10
+
+
+def test_counters_that_cannot_be_built_change_nothing():
+    def broken():
+        raise ParameterError("t_min", 60, "at most t_max")
+
+    refused, plain = ready(), ready()
+    for tracker in (refused, plain):
+        run(tracker, data_packets([10] * 7))
+    before = refused.snapshot()
+    with pytest.raises(ParameterError):
+        refused.change_counters({"half": Half, "broken": broken}, primary="half")
+    assert refused.snapshot() == before
+    assert run(refused, data_packets([10] * 13, start=70)) == run(plain, data_packets([10] * 13, start=70))
+    assert refused.snapshot() == plain.snapshot()
+    (segment,) = only(refused.change_counters({"half": Half}, primary="half"), Segmented)
+    assert segment.steps == plain.total
 
 
 def test_a_counter_that_stays_goes_on_without_a_break():
