@@ -110,11 +110,6 @@ def stop(s: State) -> None:
     s[BOUT_STEPS] = s[PERIOD] = s[RHYTHM] = 0.0
 
 
-def pending(s: State) -> int:
-    """Return how many steps are held or expected by the rhythm."""
-    return sum(passes for _, _, passes in likely(s))
-
-
 def likely(s: State) -> list[Likely]:
     """Return crests that can become steps: index, height, and whether the rhythm has them all but certain.
 

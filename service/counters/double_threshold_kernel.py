@@ -142,8 +142,8 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
             rising = now
     if n > 0:
         s[FILTERED] = out[n - 1]
-    s[NEXT] = first + n
-    return _take(s, first + n, out, rows)
+    k = s[NEXT] = first + n
+    return _take(s, k, out, rows) if s[RIPE] < k or s[CLOSE_AT] < k else rows
 
 
 def _filter(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> None:
@@ -187,21 +187,15 @@ def stop(s: State) -> None:
     s[BOUT_PEAKS] = 0.0
 
 
-def pending(s: State) -> int:
-    """Return how many peaks pass what is known of the rules."""
-    return sum(passes for _, _, passes in likely(s))
-
-
 def likely(s: State) -> list[Likely]:
     """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
     Those are the held ones of a bout that can still become certain, and all undecided ones that no rule excludes yet.
     One passes if it does by the thresholds of the last window and no other that does lies too near before it.
     """
-    peaks, bout, last = s[BOUT_PEAKS], s[BOUT], s[LAST]
-    uncertain = 0.0 < peaks < bout and s[CREDIT] > 0.0
-    waiting = _waiting(s) if s[COUNT] > 0.0 else []
-    if not uncertain:
+    peaks, last = s[BOUT_PEAKS], s[LAST]
+    waiting = _waiting(s, peaks, last) if s[COUNT] > 0.0 else []
+    if not 0.0 < peaks < s[BOUT] or s[CREDIT] == 0.0:
         return waiting
     first = waiting[0][0] if waiting else s[NEXT] - s[HALF]
     if min(first, s[NEXT] - s[HALF]) - last >= s[MAX_SPACING]:
@@ -210,22 +204,24 @@ def likely(s: State) -> list[Likely]:
     return [(s[i + 1], s[i + 3] - s[i + 4], True) for i in held] + waiting
 
 
-def _waiting(s: State) -> list[Likely]:
+def _waiting(s: State, peaks: float, last: float) -> list[Likely]:
     """Return the undecided peaks that no rule excludes yet."""
     found: list[Likely] = []
-    upper, low, rest = s[HIGH], s[FILTERED], s[REST]
-    in_force = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
-    if in_force:
-        upper, low = (s[HIGH] + s[LOW]) / 2.0, s[LOW]
-    nearest = s[MIN_SPACING]
-    after = s[LAST] + nearest if s[BOUT_PEAKS] > 0.0 else -1.0
-    sure_after = after
-    short = 0.0 if s[CREDIT] > 0.0 else s[BOUT] - s[BOUT_PEAKS] - 1.0
-    head, capacity = int(s[HEAD]), int(s[CAPACITY])
-    for i in range(int(s[COUNT])):
-        q = QUEUE + (head + i) % capacity * ENTRY
-        at, peak = s[q + AT], s[q + PEAK]
-        if at <= after or (s[q + CLOSED] > 0.0 and not _can_pass(s, q)):
+    nearest, rest, in_force = s[MIN_SPACING], s[REST], s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    low = s[LOW] if in_force else s[FILTERED]
+    upper = (s[HIGH] + low) / 2.0
+    after = sure_after = last + nearest if peaks > 0.0 else -1.0
+    short = 0.0 if s[CREDIT] > 0.0 else s[BOUT] - peaks - 1.0
+    q, end = QUEUE + int(s[HEAD]) * ENTRY, QUEUE + int(s[CAPACITY]) * ENTRY
+    for _ in range(int(s[COUNT])):
+        at, peak, known = s[q + AT], s[q + PEAK], s[q + CLOSED] > 0.0
+        excluded = at <= after or (
+            known and (peak <= s[q + UPPER] or (s[q + SEEN] >= s[VALLEYS] and s[q + VALLEY] >= s[q + LOWER]))
+        )
+        q += ENTRY
+        if q == end:
+            q = QUEUE
+        if excluded:
             continue
         if short > 0.0:
             short -= 1.0  # a reference at most
@@ -234,15 +230,8 @@ def _waiting(s: State) -> list[Likely]:
         passes = in_force and peak > upper and height >= rest and at > sure_after
         if passes:
             sure_after = at + nearest
-        found.append((at, max(height, 0.0), passes))
+        found.append((at, height if height > 0.0 else 0.0, passes))  # noqa: FURB136  # a call costs more
     return found
-
-
-def _can_pass(s: State, q: int) -> bool:
-    """Tell whether the peak at queue place `q`, whose thresholds are known, can still pass them."""
-    if s[q + PEAK] <= s[q + UPPER]:
-        return False
-    return s[q + SEEN] < s[VALLEYS] or s[q + VALLEY] < s[q + LOWER]
 
 
 def _take(s: State, k: float, out: State, rows: int) -> int:

@@ -176,7 +176,6 @@ def build(params: FusionParams = TUNED) -> KernelCounter:
             scan=kernel.scan,
             close=kernel.close,
             stop=kernel.stop,
-            pending=kernel.pending,
             likely=kernel.likely,
             next_index=state.NEXT,
             constants=state.CONSTANTS,

@@ -163,11 +163,6 @@ def stop(s: State) -> None:
     end_bout(s)
 
 
-def pending(s: State) -> int:
-    """Return how many peaks are held or high enough."""
-    return sum(passes for _, _, passes in likely(s))
-
-
 def likely(s: State) -> list[Likely]:
     """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 

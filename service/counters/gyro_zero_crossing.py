@@ -162,7 +162,6 @@ _KERNEL: Final = Kernel(
     scan=kernel.scan,
     close=kernel.close,
     stop=kernel.stop,
-    pending=kernel.pending,
     likely=kernel.likely,
     next_index=kernel.NEXT,
     constants=kernel.CONSTANTS,

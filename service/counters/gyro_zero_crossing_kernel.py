@@ -172,11 +172,6 @@ def stop(s: State) -> None:
     s[DUE] = NEVER
 
 
-def pending(s: State) -> int:
-    """Return how many steps are held or past their threshold."""
-    return sum(passes for _, _, passes in likely(s))
-
-
 def likely(s: State) -> list[Likely]:
     """Return every crossing that can still become a step: where, how strong, and whether it is past its threshold.
 

@@ -49,8 +49,8 @@ class Kernel:
     `scan(*columns, n, s, out)` eats n samples, writes the filtered signal to `out[:n]` and rows after it, and returns
     where they end; it is compiled for whole recordings. `close(s, out)` ends the stretch (at a gap or the end), writes
     rows to `out[0:]` and returns where they end. `stop(s)` forgets what must not outlast the end of the stream.
-    `likely(s)`, where an algorithm can name them, gives every peak that can still become a step: grid index (the
-    filter's delay not removed), strength, whether it passes what is in force; `pending(s)` counts those that pass.
+    `likely(s)` gives every peak that can still become a step: grid index (the filter's delay not removed), strength,
+    whether it passes what is in force.
     `s[next_index]` is the index of the sample to come, −1 before the first stretch; `s[:constants]` never changes. A
     row is `row` floats; `delay` is by how many samples the filtered signal lags, give or take
     `time_error`.
@@ -60,12 +60,11 @@ class Kernel:
     scan: Callable[..., int]
     close: Callable[[Any, Any], int]
     stop: Callable[[Any], None]
-    pending: Callable[[Any], int]
+    likely: Callable[[Any], list[Likely]]
     next_index: int
     constants: int
     row: int
     delay: float
-    likely: Callable[[Any], list[Likely]] | None = None
     time_error: float = 0.0
     sensors: tuple[Sensor, ...] = (Sensor.ACCELEROMETER,)
 
@@ -96,6 +95,7 @@ class KernelCounter:
         self.latency_s = latency_s
         self.time_error_s = kernel.time_error / GRID_HZ
         self._kernel = kernel
+        self._scan, self._named, self._next, self._delay = kernel.scan, kernel.likely, kernel.next_index, kernel.delay
         self._sensors = [(sensor, FIELDS[sensor]) for sensor in kernel.sensors]
         self._state = state
         self._room_for = room
@@ -105,22 +105,21 @@ class KernelCounter:
 
     def update(self, block: SampleBlock) -> Update:
         """Count on over `block`; ValueError where it overlaps, CounterError where a sensor is missing."""
-        kernel = self._kernel
         columns = self._columns(block)
         n = len(columns[0])
         if n == 0:
-            return Update(pending=kernel.pending(self._state), likely=self._likely() or ())
-        rows = [] if block.start == self._state[kernel.next_index] else self._open(block.start, columns)
+            pending, likely = self._likely()
+            return Update(pending=pending, likely=likely)
+        rows = [] if block.start == self._state[self._next] else self._open(block.start, columns)
         if n > COMPILED_FROM:
-            signal, more = np.empty(n), _Rows(n, kernel.row)
+            signal, more = np.empty(n), _Rows(n, self._kernel.row)
             self._scan_arrays(columns, n, more, signal)
             trace, found = signal.tolist(), more.all().tolist()
         else:
             trace, found = self._scan_lists(columns, n)
         steps, bands = self._events(rows + found) if rows or found else NOTHING
-        likely = self._likely()
-        pending = sum([one[2] for one in likely]) if likely or kernel.likely else kernel.pending(self._state)
-        return Update(steps, pending, likely, (block.start - kernel.delay) / GRID_HZ, trace, bands)
+        pending, likely = self._likely()
+        return Update(steps, pending, likely, (block.start - self._delay) / GRID_HZ, trace, bands)
 
     def finish(self) -> Update:
         """End the stream: what waits is decided with what is there."""
@@ -157,13 +156,17 @@ class KernelCounter:
         """Return the steps that `count`'s rows say."""
         return self._events(rows.ravel().tolist())[0]
 
-    def _likely(self) -> list[Likely]:
-        kernel = self._kernel
-        found = kernel.likely(self._state) if kernel.likely else None
+    def _likely(self) -> tuple[int, Sequence[Likely]]:
+        """Return how many steps are pending, and every one that may come, at its device time."""
+        found = self._named(self._state)
         if not found:
-            return []
-        delay = kernel.delay
-        return [((index - delay) / GRID_HZ, strength, passes) for index, strength, passes in found]
+            return 0, ()
+        pending, delay = 0, self._delay
+        likely: list[Likely] = []
+        for index, strength, passes in found:
+            likely.append(((index - delay) / GRID_HZ, strength, passes))
+            pending += passes
+        return pending, likely
 
     def _columns(self, block: SampleBlock) -> tuple[Column, ...]:
         columns: tuple[Column, ...] = ()
@@ -196,7 +199,7 @@ class KernelCounter:
                 columns = tuple(map(_as_list, columns))
                 break
         out = self._out
-        end = self._kernel.scan(*columns, n, self._state, out)
+        end = self._scan(*columns, n, self._state, out)
         return out[:n], out[n:end] if end > n else []
 
     def _scan_arrays(

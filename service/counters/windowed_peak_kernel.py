@@ -150,11 +150,6 @@ def stop(s: State) -> None:
     s[PEAKS] = 0.0
 
 
-def pending(s: State) -> int:
-    """Return how many peaks pass what is known of the rules."""
-    return sum(passes for _, _, passes in likely(s))
-
-
 def likely(s: State) -> list[Likely]:
     """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 

@@ -285,7 +285,7 @@ def test_likely_steps_are_named_before_they_are_certain_and_keep_their_time():
     assert len(steps) >= 14
     assert {step.at_s for step in steps} <= named
     assert len(named) <= len(steps) + 1
-    assert counter.update(block_of([1.0], start=len(norm))).likely == []
+    assert counter.update(block_of([1.0], start=len(norm))).likely == ()
 
 
 def test_nothing_is_likely_that_could_not_count():

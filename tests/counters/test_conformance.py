@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -127,7 +126,7 @@ def test_the_suite_catches_a_counter_that_confirms_what_it_has_not_told():
     class Silent:
         def __new__(cls):
             counter = registry.make("double_threshold")
-            counter._kernel = replace(counter._kernel, likely=lambda _: [])
+            counter._named = lambda _: []
             return counter
 
     signal = Signal(walk(600, 2.0, 0.6))

@@ -352,7 +352,7 @@ def test_nothing_is_likely_at_rest():
     counter = build(TUNED)
     counter.update(walk(1.2).block())
     after = counter.update(Signal(still(200)).block(offset=60))
-    assert after.likely == []
+    assert list(after.likely) == []
     assert after.pending == 0
 
 
