@@ -35,7 +35,7 @@ On the dev recordings, mean absolute percentage error and false steps an hour; `
 
 | | eth2023 | eth2022 | dcaiti | brajdic walk | spar | brajdic handling |
 | --- | --- | --- | --- | --- | --- | --- |
-| paper | 69.8 | 23.2 | 46.8 | 22.8 | 5812 | 1290 |
+| paper | 69.8 | 23.2 | 46.8 | 22.8 | 5811 | 1289 |
 | tuned | 23.0 | 10.5 | 21.0 | 9.7 | 2516 | 1067 |
 | axis x | 40.5 | 17.8 | 7.1 | 8.2 | 4396 | 1093 |
 | axis z | 41.5 | 31.9 | 27.9 | 5.5 | 3534 | 837 |

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+FEW_GROUPS: Final = 4
+"""Fewer are drawn no wider."""
 BAR_FROM_PERCENT: Final = 1.0
 """A shorter bar cannot be seen: its value is written instead."""
 STEPS_OFF: Final = "counted − true / steps"
@@ -84,6 +86,8 @@ def _beside_published(axes: Axes, bars: Sequence[Bar], methods: Sequence[str]) -
         claimed = "published" if number == len(methods) - 1 else None
         axes.bar(at, [bar.published for bar in of], width, fill=False, edgecolor="black", lw=1.2, label=claimed)
     axes.set_xticks(range(len(groups)), [_wrapped(group, 84 // len(groups)) for group in groups], fontsize="x-small")
+    aside = 0.5 + max(0.0, (FEW_GROUPS - len(groups)) / 2)
+    axes.set_xlim(-aside, len(groups) - 1 + aside)
     label(axes, y=f"{'recordings' if bars[0].real else 'walkers'}: accuracy / %")
 
 
@@ -159,8 +163,10 @@ def error_by_cadence(path: Path, rows: Sequence[Row]) -> Path:
                 *medians(cadence_spm, percent), "_", color="black", ms=12, mew=2, label="median of each 10 steps/min"
             )
             each.axhline(0, color="black", lw=0.8)
-            each.set_yscale("symlog", linthresh=LINEAR_PERCENT)
+            each.set_yscale("symlog", linthresh=LINEAR_PERCENT, subs=[3])
             each.yaxis.set_major_formatter("{x:g}")
+            each.yaxis.set_minor_formatter("{x:g}")
+            each.tick_params(axis="y", which="both", labelsize="small")
             each.set_title(counter, fontsize="small", loc="right")
             label(each, y="error / %", legend=not number)
         label(axes[-1], title="Error by cadence: (counted − true)/true", x="cadence / steps/min")
