@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from device_sim.gatt import GattBracelet
     from device_sim.source import Source
     from service.evaluation.choices import Found
+    from service.evaluation.papers.report import Bar
     from service.evaluation.rows import Row
     from service.links.ble import Backend
     from service.pipeline.supervisor import Supervisor
@@ -186,7 +187,7 @@ async def _evaluate_paper(options: argparse.Namespace) -> None:
         )
     print(made.text())
     json_file.write_json(output, made.as_json())
-    await _draw(folder, made.rows, found, options)
+    await _draw(folder, made.rows, found, options, made.bars)
 
 
 def _figures_folder(options: argparse.Namespace) -> Path | None:
@@ -195,13 +196,19 @@ def _figures_folder(options: argparse.Namespace) -> Path | None:
     return None if options.figures is None else checked_folder(options.figures)
 
 
-async def _draw(folder: Path | None, rows: Sequence[Row], found: Sequence[Found], options: argparse.Namespace) -> None:
+async def _draw(
+    folder: Path | None,
+    rows: Sequence[Row],
+    found: Sequence[Found],
+    options: argparse.Namespace,
+    bars: Sequence[Bar] = (),
+) -> None:
     """Draw the figures where a folder for them was named."""
     if folder is None:
         return
     from service.evaluation.figures.draw import write  # noqa: PLC0415
 
-    written = await asyncio.to_thread(write, folder, rows, found, lsb_per_g=options.lsb_per_g)
+    written = await asyncio.to_thread(write, folder, rows, found, lsb_per_g=options.lsb_per_g, bars=bars)
     print(f"steplink: {len(written)} figures in {folder}: {', '.join(path.stem for path in written)}", file=sys.stderr)
 
 

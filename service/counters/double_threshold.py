@@ -32,17 +32,17 @@ On the dev recordings, mean absolute percentage error and false steps an hour; `
 
 | | eth2023 | eth2022 | banglejs | pebble | oxford_opt | hmp | spar | driving, desk |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
-| paper | 73.3 | 20.3 | 19.4 | 13.4 | 16.3 | 5389 | 4426 | 1766 |
-| tuned | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2564 | 37 |
-| axes xz | 17.9 | 26.1 | 11.2 | 4.2 | 5.4 | 1177 | 2886 | 24 |
-| half_width 2 | 18.8 | 7.7 | 14.6 | 3.7 | 2.3 | 1312 | 2492 | 49 |
-| valley_wait 100 | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2767 | 41 |
-| rest_raw 1 | 82.4 | 13.9 | 10.4 | 8.0 | 7.3 | 6316 | 5089 | 1674 |
-| lower_share 0 | 14.3 | 21.2 | 45.5 | 18.0 | 5.9 | 1094 | 2162 | 31 |
-| min_spacing 10 | 24.3 | 5.6 | 14.5 | 8.0 | 8.0 | 1468 | 2898 | 38 |
-| max_spacing 250 | 26.2 | 7.4 | 13.8 | 4.0 | 2.9 | 1471 | 3310 | 126 |
-| credit never | 8.0 | 20.1 | 19.2 | 5.0 | 2.7 | 1019 | 1966 | 15 |
-| bout 2 | 26.0 | 7.1 | 14.3 | 4.0 | 2.9 | 1698 | 3109 | 152 |
+| paper | 73.3 | 20.3 | 19.4 | 13.4 | 16.3 | 5401 | 4427 | 1766 |
+| tuned | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2565 | 37 |
+| axes xz | 17.9 | 26.1 | 11.2 | 4.2 | 5.4 | 1175 | 2886 | 24 |
+| half_width 2 | 18.8 | 7.7 | 14.6 | 3.7 | 2.3 | 1313 | 2493 | 49 |
+| valley_wait 100 | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2768 | 41 |
+| rest_raw 1 | 82.4 | 13.9 | 10.4 | 8.1 | 7.3 | 6321 | 5090 | 1674 |
+| lower_share 0 | 14.3 | 21.2 | 45.5 | 18.0 | 5.9 | 1095 | 2163 | 31 |
+| min_spacing 10 | 24.3 | 5.6 | 14.5 | 8.0 | 8.0 | 1469 | 2898 | 38 |
+| max_spacing 250 | 26.1 | 7.4 | 13.8 | 4.0 | 2.9 | 1472 | 3311 | 126 |
+| credit never | 8.0 | 20.1 | 19.2 | 5.0 | 2.7 | 1020 | 1967 | 15 |
+| bout 2 | 26.0 | 7.1 | 14.2 | 4.0 | 2.9 | 1699 | 3110 | 152 |
 
 So rest at 0.18 g rejects most false steps; T_L above L finds the steps it costs (a valley alone in its window passes
 T_L = L only if it lies below the mean before); bouts of five reject short gestures, and walks of four steps with them.
