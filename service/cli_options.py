@@ -7,9 +7,12 @@ import dataclasses
 import math
 import os
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from service.config import Settings
+
+if TYPE_CHECKING:
+    from service.recordings import ColumnMapping
 
 DEFAULT_AIR: Final = "127.0.0.1:7400"
 DEMO_WALK: Final = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
@@ -54,6 +57,13 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--units", default="g", help="with --columns: acceleration in g, mg or m/s2 (default g)")
     parser.add_argument("--time-unit", default="s", help="with --columns: time in s, ms, us or ns (default s)")
+
+
+def mapping(options: argparse.Namespace) -> ColumnMapping | None:
+    """Return which columns texts have, None where the options do not say."""
+    from service.recordings import column_mapping  # noqa: PLC0415
+
+    return None if options.columns is None else column_mapping(options.columns, options.units, options.time_unit)
 
 
 def add_bracelet(parser: argparse.ArgumentParser) -> None:

@@ -124,8 +124,57 @@ def test_ctrl_c_ends_all_processes_at_once(tmp_path, after_s):
         os.killpg(process.pid, signal.SIGINT)
         out, _ = process.communicate(timeout=20)
     assert time.monotonic() - began < ENDS_WITHIN_S
-    assert process.returncode == 0
+    assert process.returncode == 130
+    assert out == "steplink: stopped before it was done\n"
+
+
+@pytest.mark.parametrize("after_s", [1.0, 4.0])
+def test_ctrl_c_ends_a_bench_at_once(after_s):
+    with subprocess.Popen(command("bench"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(after_s)
+        assert process.poll() is None
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    assert time.monotonic() - began < ENDS_WITHIN_S
+    assert process.returncode == 130
+    assert "Traceback" not in err
+
+
+def test_ctrl_c_ends_a_papers_tables_while_recordings_are_looked_through(tmp_path):
+    for k in range(60):
+        save(walk(600, 100), tmp_path / "many" / f"{k}.npz", placement="wrist", activity="nothing")
+    with subprocess.Popen(
+        command("evaluate", "--paper", "wang2018", tmp_path),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        time.sleep(3.0)
+        assert process.poll() is None
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=20)
+    assert time.monotonic() - began < ENDS_WITHIN_S
+    assert process.returncode == 130
     assert "Traceback" not in out
+
+
+def test_rows_are_written_though_nobody_reads_the_table(folder, tmp_path):
+    reads, writes = os.pipe()
+    os.close(reads)
+    for name, out, environment in (
+        ("gone", writes, {}),
+        ("letters", subprocess.DEVNULL, {"PYTHONIOENCODING": "ascii"}),
+    ):
+        words = command("evaluate", "walks", "--jobs", 1, "--json", tmp_path / name)
+        with subprocess.Popen(
+            words, stdout=out, stderr=subprocess.PIPE, text=True, cwd=folder, env=os.environ | environment
+        ) as process:
+            _, err = process.communicate(timeout=60)
+        assert (process.returncode, err) == (0, ""), name
+        assert len(json.loads((tmp_path / name).read_text("utf-8"))) == 2
+    os.close(writes)
 
 
 def test_the_bench_prints_and_writes_its_figures_and_says_what_it_lacks(tmp_path, bare):
