@@ -2,6 +2,7 @@
 
 import io
 import os
+from contextlib import contextmanager
 
 import pytest
 
@@ -9,24 +10,25 @@ from service.cli import main
 from service.cli_output import say, spell_out
 
 
-@pytest.fixture
-def gone(monkeypatch):
+@contextmanager
+def nobody_reading(monkeypatch):
     """Standard output as a pipe whose reader has left."""
     reads, writes = os.pipe()
     os.close(reads)
-    with os.fdopen(writes, "w", encoding="utf-8") as out:
-        monkeypatch.setattr("sys.stdout", out)
-        yield out
+    with os.fdopen(writes, "w", encoding="utf-8") as out, monkeypatch.context() as patch:
+        patch.setattr("sys.stdout", out)
+        yield
 
 
-def test_a_reader_that_has_gone_is_told_once_and_the_rest_is_silence(gone):
-    assert not say("one")
-    assert say("two")
-    gone.flush()
+def test_a_reader_that_has_gone_is_told_once_and_the_rest_is_silence(monkeypatch):
+    with nobody_reading(monkeypatch):
+        assert not say("one")
+        assert say("two")
 
 
-def test_a_command_whose_reader_has_gone_ends_as_usual(gone, capfd):
-    assert main(["counters", "double_threshold"]) == 0
+def test_a_command_whose_reader_has_gone_ends_as_usual(monkeypatch, capfd):
+    with nobody_reading(monkeypatch):
+        assert main(["counters", "double_threshold"]) == 0
     assert capfd.readouterr().err == ""
 
 

@@ -25,8 +25,8 @@ class Row:
 
     `path` is as it was asked for, `dataset` the folder the file lies in. `true_steps` is None where unknown, `steps`
     where `error` says why there are none; `samples` are those of the 50 Hz grid. `tp`, `fp`, `fn` are None where step
-    times are unknown. `blind`, `saturated` and `changed` (parameters that differ from the preset's) are for the
-    tables only.
+    times are unknown. `saturated` tells whether the sensor was at its limit, None where the file could not be read.
+    `blind` and `changed` (parameters that differ from the preset's) are for the tables only.
     """
 
     path: str
@@ -45,7 +45,7 @@ class Row:
     elapsed_s: float | None = None
     matches: Matches | None = None
     blind: Matches | None = None
-    saturated: bool = False
+    saturated: bool | None = None
     changed: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
@@ -69,6 +69,6 @@ class Row:
 
 _PLAIN: Final = (
     "path", "dataset", "placement", "activity", "rate_hz", "counter", "preset", "params", "true_steps", "steps",
-    "error", "duration_s", "samples", "elapsed_s",
+    "error", "duration_s", "samples", "elapsed_s", "saturated",
 )  # fmt: skip
 """Keys of a row in JSON, in their order; `tp`, `fp`, `fn` follow."""

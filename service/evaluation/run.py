@@ -13,9 +13,6 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from dataclasses import asdict, replace
-from typing import Final
-
-import numpy as np
 
 from service.counters import registry
 from service.errors import SteplinkError
@@ -23,14 +20,9 @@ from service.evaluation.choices import Found
 from service.evaluation.counting import count, grid_block
 from service.evaluation.metrics import Times, match, metronome_s
 from service.evaluation.rows import Choice, Row
+from service.evaluation.saturation import saturated
 from service.recordings import Recording, read
 from service.samples import SampleBlock
-
-PLATEAU_SAMPLES: Final = 3
-"""Equal samples in a row at the largest value of a recording: the sensor's range ended there."""
-
-PLATEAU_FROM_G: Final = 1.4
-"""A coarse sensor at rest repeats itself at 1 g; no sensor's range ends below 1.5 g."""
 
 Progress = Callable[[int, int], None]
 """Is told how many recordings are done, and of how many."""
@@ -138,17 +130,6 @@ def _counted(row: Row, block: SampleBlock, choice: Choice, true_s: Times | None)
         return row
     blind = match(metronome_s(counted.steps, true_s), true_s)
     return replace(row, matches=match(counted.step_t_s, true_s), blind=blind)
-
-
-def saturated(recording: Recording) -> bool:
-    """Tell whether the sensor's range ended below what it felt: a plateau at the recording's largest value."""
-    size_g = np.abs(recording.acc_g)
-    top_g = size_g.max()
-    at_top = size_g == top_g
-    together = at_top[PLATEAU_SAMPLES - 1 :].copy()
-    for before in range(1, PLATEAU_SAMPLES):
-        together &= at_top[PLATEAU_SAMPLES - 1 - before : len(at_top) - before]
-    return bool(top_g >= PLATEAU_FROM_G and together.any())
 
 
 def _params(choice: Choice) -> dict[str, object]:
