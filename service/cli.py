@@ -218,7 +218,9 @@ def _source(options: argparse.Namespace) -> Source:
         return WalkerSource(options.walk, seed=options.seed, loop=not options.once)
     from service.recordings import read  # noqa: PLC0415
 
-    recording = read(options.recording, lsb_per_g=options.lsb_per_g, mapping=cli_options.mapping(options))
+    recording = read(
+        options.recording, lsb_per_g=options.lsb_per_g, mapping=cli_options.mapping(options), rate_hz=options.rate_hz
+    )
     return RecordingSource(recording, loop=not options.once)
 
 

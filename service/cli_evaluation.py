@@ -38,16 +38,20 @@ async def evaluate(options: argparse.Namespace) -> int:
         return 0
     names, paths = choices.counters_and_paths(options.counter, options.path)
     chosen = choices.choices(names, options.preset or "tuned", options.param)
-    found, passed = choices.find(paths, mapping(options))
+    found, passed = choices.find(paths, mapping(options), options.rate_hz)
     output, folder = json_file.checked_path(options.json), _figures_folder(options)
     if passed:
-        print(f"steplink: passed over texts without acceleration: {', '.join(passed)}", file=sys.stderr)
+        print(f"steplink: passed over texts without acceleration: {', '.join(passed)}{_hint(options)}", file=sys.stderr)
     with ProgressBar() as progress:
         rows = await run(found, chosen, jobs=options.jobs, lsb_per_g=options.lsb_per_g, progress=progress)
     json_file.write_json(output, (row.as_json() for row in rows))
     say(report(rows))
     _draw(folder, rows, found, options)
     return NOTHING_COUNTED if all(row.error for row in rows) else 0
+
+
+def _hint(options: argparse.Namespace) -> str:
+    return "" if options.columns else " (--columns names those of another table)"
 
 
 async def _evaluate_paper(options: argparse.Namespace) -> None:

@@ -75,7 +75,7 @@ def _ctrl_c_ignored() -> Iterator[None]:
 def rows_of(file: Found, chosen: Sequence[Choice], lsb_per_g: float) -> list[Row]:
     """Read one recording and count it with each counter."""
     try:
-        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping)
+        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping, rate_hz=file.rate_hz)
         block = grid_block(recording)
     except Exception as error:  # one recording must not end the others
         return failed_rows(file, chosen, _told(error))
