@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING
 
 from service.cli_options import mapping
 from service.cli_output import say
+from service.errors import ParameterError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from service.evaluation.choices import Found
-    from service.evaluation.rows import Row
+    from service.evaluation.rows import Choice, Row
 
 NOTHING_COUNTED = 1
 
@@ -39,6 +40,7 @@ async def evaluate(options: argparse.Namespace) -> int:
     names, paths = choices.counters_and_paths(options.counter, options.path)
     chosen = choices.choices(names, options.preset or "tuned", options.param)
     found, passed = choices.find(paths, mapping(options), options.rate_hz)
+    chosen = _calibrated(chosen, options)
     output, folder = json_file.checked_path(options.json), _figures_folder(options)
     if passed:
         print(f"steplink: passed over texts without acceleration: {', '.join(passed)}{_hint(options)}", file=sys.stderr)
@@ -48,6 +50,19 @@ async def evaluate(options: argparse.Namespace) -> int:
     say(report(rows))
     _draw(folder, rows, found, options)
     return NOTHING_COUNTED if all(row.error for row in rows) else 0
+
+
+def _calibrated(chosen: list[Choice], options: argparse.Namespace) -> list[Choice]:
+    """Return the counters with what they are to learn, or have learnt from a walk."""
+    from service.evaluation import calibration, counting  # noqa: PLC0415
+    from service.recordings import read  # noqa: PLC0415
+
+    if options.calibrate is None:
+        return chosen
+    if options.calibrate == calibration.EACH_MIDDLE:
+        return calibration.from_middle(chosen)
+    walk = read(options.calibrate, lsb_per_g=options.lsb_per_g, rate_hz=options.rate_hz, mapping=mapping(options))
+    return calibration.from_walk(chosen, counting.grid_block(walk), options.calibrate)
 
 
 def _hint(options: argparse.Namespace) -> str:
@@ -60,6 +75,8 @@ async def _evaluate_paper(options: argparse.Namespace) -> None:
     from service.evaluation.papers import run  # noqa: PLC0415
     from service.evaluation.progress import ProgressBar  # noqa: PLC0415
 
+    if options.calibrate is not None:
+        raise ParameterError("calibrate", options.calibrate, "a paper's tables say themselves how its counter learns")
     asked = run.asked(options.paper, options.counter, options.param)
     found = run.recordings(options.path)
     output, folder = json_file.checked_path(options.json), _figures_folder(options)

@@ -141,6 +141,12 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         metavar="NAME.KEY=V",
         help="change one parameter of one counter, as in double_threshold.bout=3; may be repeated",
     )
+    parser.add_argument(
+        "--calibrate",
+        metavar="WALK",
+        help="let counters learn before they count: `middle`, each recording from its own middle 300 samples"
+        " (double_threshold), or a file, a calibration walk (double_threshold, gyro_zero_crossing: as slow as ever)",
+    )
     _add_json(parser, "write a row for each recording and counter there")
     parser.add_argument(
         "--paper",

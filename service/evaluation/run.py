@@ -16,6 +16,7 @@ from dataclasses import asdict, replace
 
 from service.counters import registry
 from service.errors import SteplinkError
+from service.evaluation.calibration import taught
 from service.evaluation.choices import Found
 from service.evaluation.counting import count, grid_block
 from service.evaluation.metrics import Times, match, metronome_s
@@ -79,7 +80,7 @@ def rows_of(file: Found, chosen: Sequence[Choice], lsb_per_g: float) -> list[Row
         block = grid_block(recording)
     except Exception as error:  # one recording must not end the others
         return failed_rows(file, chosen, _told(error))
-    return [_row(file, recording, block, choice) for choice in chosen]
+    return [_row(file, recording, block, taught(choice, block), asked=choice) for choice in chosen]
 
 
 def failed_rows(file: Found, chosen: Sequence[Choice], error: str) -> list[Row]:
@@ -98,7 +99,7 @@ def failed_rows(file: Found, chosen: Sequence[Choice], error: str) -> list[Row]:
     ]
 
 
-def _row(file: Found, recording: Recording, block: SampleBlock, choice: Choice) -> Row:
+def _row(file: Found, recording: Recording, block: SampleBlock, choice: Choice, *, asked: Choice) -> Row:
     true_s = None if recording.step_t_s is None else recording.step_t_s - recording.t_s[0]
     true = len(true_s) if recording.true_steps is None and true_s is not None else recording.true_steps
     row = Row(
@@ -107,7 +108,9 @@ def _row(file: Found, recording: Recording, block: SampleBlock, choice: Choice) 
         counter=choice.counter,
         preset=choice.preset,
         params=_params(choice),
-        changed=tuple(choice.overrides),
+        changed=tuple(asked.overrides),
+        calibration=choice.calibration,
+        uncalibrated=choice.from_middle and choice.calibration is None,
         placement=recording.placement,
         activity=recording.activity,
         rate_hz=recording.rate_hz,

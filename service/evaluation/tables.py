@@ -73,10 +73,11 @@ def aligned(lines: Sequence[Sequence[str]], *, left: int) -> str:
     return "\n".join([texts[0], "─" * max(map(len, texts)), *texts[1:]])
 
 
-def _asked(rows: Iterable[Row]) -> str:
+def _asked(rows: Sequence[Row]) -> str:
     """Say with which parameters: the preset, and what was changed of it."""
     changed = {f"{row.counter}.{key}={row.params[key]}" for row in rows for key in row.changed}
-    return " ".join([f"preset {' '.join(sorted({row.preset for row in rows}))}", *sorted(changed)])
+    taught = ["calibrated"] if any(row.calibration for row in rows) else []
+    return " ".join([f"preset {' '.join(sorted({row.preset for row in rows}))}", *taught, *sorted(changed)])
 
 
 def _groupings(rows: Sequence[Row]) -> Iterator[tuple[str, Callable[[Row], str]]]:
@@ -123,6 +124,9 @@ def _notes(rows: Iterable[Row]) -> list[str]:
     notes = []
     if at_end:
         notes.append(f"saturated (samples pile up at the largest value, steps may be missing): {_some(at_end)}")
+    untaught = sorted({row.path for row in rows if row.uncalibrated})
+    if untaught:
+        notes.append(f"not calibrated (no walk in the middle of it): {_some(untaught)}")
     if unknown and len(listed) > EACH_RECORDING_UP_TO:
         notes.append(f"the true number is unknown for {len(unknown)} recordings; --json FILE has the count of each")
     return notes

@@ -193,7 +193,7 @@ def test_a_table_without_time_is_read_at_the_rate_declared(tmp_path, bare):
     made = walk(20, 50)
     rows = [
         " ".join(map(repr, [0.0, 0.0, 1.0, *acc, *rate]))
-        for acc, rate in zip(made.acc_g.tolist(), made.gyro_rad_s.tolist())
+        for acc, rate in zip(made.acc_g.tolist(), made.gyro_rad_s.tolist(), strict=True)
     ]
     (tmp_path / "own.txt").write_text("\n".join(rows))
     words = ["evaluate", "own.txt", "--columns", "x=4,y=5,z=6,gx=7,gy=8,gz=9", "--json", "rows.json"]

@@ -16,7 +16,8 @@ from service.evaluation.run import evaluate, failed_rows, rows_of
 
 KEYS = [
     "path", "dataset", "placement", "activity", "rate_hz", "counter", "preset", "params", "true_steps", "steps",
-    "error", "duration_s", "samples", "elapsed_s", "saturated", "tp", "fp", "fn",
+    "error", "duration_s", "samples", "elapsed_s", "saturated",
+    "calibration", "tp", "fp", "fn",
 ]  # fmt: skip
 """The contract with tools."""
 
