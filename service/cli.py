@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from service import cli_evaluation, cli_options
 from service.cli_output import say, spell_out
+from service.cli_stop import Stopped, stopped_at_once, tell
 from service.config import Settings
 from service.errors import LinkError, SteplinkError
 
@@ -32,9 +33,6 @@ if TYPE_CHECKING:
 
 USAGE_ERROR = 2
 NO_BLUETOOTH = 3
-INTERRUPTED = 130
-TERMINATED = 143
-"""What a shell expects of a command that Ctrl-C or SIGTERM kept from its result: 128 and the signal's number."""
 BOOT_NS = 50_000_000
 """A simulated bracelet that starts again later than this has another boot number."""
 
@@ -48,25 +46,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.WARNING, format="steplink: %(message)s")
     logging.getLogger("bumble").setLevel(logging.CRITICAL)  # what a lost link leaves behind is no news to a user
     try:
+        if not options.endless:
+            with stopped_at_once():
+                return asyncio.run(options.command(options)) or 0
         return asyncio.run(_stoppable(options.command(options))) or 0
-    except KeyboardInterrupt:
-        return _stopped(options, INTERRUPTED)
-    except asyncio.CancelledError:
-        return _stopped(options, TERMINATED)
+    except Stopped as stopped:
+        tell()
+        return stopped.code
+    except (KeyboardInterrupt, asyncio.CancelledError):
+        return 0
     except LinkError as error:
         print(f"steplink: {error}", file=sys.stderr)
         return NO_BLUETOOTH
     except SteplinkError as error:
         print(f"steplink: {error}", file=sys.stderr)
         return USAGE_ERROR
-
-
-def _stopped(options: argparse.Namespace, code: int) -> int:
-    """Return the exit code of a command that was told to end: 0 where that is its only end."""
-    if options.endless:
-        return 0
-    print("steplink: stopped before it was done", file=sys.stderr)
-    return code
 
 
 async def _stoppable(work: Coroutine[Any, Any, int | None]) -> int | None:

@@ -1,17 +1,14 @@
 """The commands that end by themselves with a result: `steplink evaluate`, `bench`, `counters`.
 
-What is asked for is checked before any work is done, files are written before anything is printed, and Ctrl-C ends
-each at once, also in the midst of a long computation.
+What is asked for is checked before any work is done, and files are written before anything is printed.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import dataclasses
-import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from service.cli_options import mapping
@@ -106,8 +103,7 @@ def _draw(folder: Path | None, rows: Sequence[Row], found: Sequence[Found], opti
         return
     from service.evaluation.figures.draw import write  # noqa: PLC0415
 
-    with _stopped_at_once():
-        written = write(folder, rows, found, lsb_per_g=options.lsb_per_g)
+    written = write(folder, rows, found, lsb_per_g=options.lsb_per_g)
     print(f"steplink: {len(written)} figures in {folder}: {', '.join(path.stem for path in written)}", file=sys.stderr)
 
 
@@ -121,12 +117,11 @@ async def bench(options: argparse.Namespace) -> None:
     if not available():
         print(bench.WITHOUT_NUMBA, file=sys.stderr)
     figures = []
-    with _stopped_at_once():
-        for figure in bench.figures(names, options.samples):
-            figures.append(dataclasses.asdict(figure))
-            read = say(f"{figure.name:<58}{figure.value:>15,.4g} {figure.unit}")
-            if not read and output is None:
-                return
+    for figure in bench.figures(names, options.samples):
+        figures.append(dataclasses.asdict(figure))
+        read = say(f"{figure.name:<58}{figure.value:>15,.4g} {figure.unit}")
+        if not read and output is None:
+            return
     json_file.write_json(output, figures)
 
 
@@ -141,15 +136,3 @@ async def counters(options: argparse.Namespace) -> None:
         say(aligned([describe.OVERVIEW, *describe.overview()], left=4))
     else:
         say(aligned([describe.PARAMETERS, *describe.parameters(options.name)], left=6))
-
-
-@contextlib.contextmanager
-def _stopped_at_once() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end a computation that never comes back to the loop, which alone would heed them."""
-    interrupted = signal.signal(signal.SIGINT, signal.default_int_handler)
-    terminated = signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, interrupted)
-        signal.signal(signal.SIGTERM, terminated)
