@@ -66,8 +66,7 @@ async def _real(
     of: Paper, found: Sequence[Found], preset: str, jobs: int, lsb_per_g: float, progress: Progress
 ) -> list[Measured]:
     used = [method for method in methods(of) if method.counter in registry.COUNTERS]
-    # One by one: a thread that reads them all would keep Ctrl-C waiting.
-    files = [file for each in found for file in await asyncio.to_thread(wanted, of, [each], lsb_per_g)]
+    files = await asyncio.to_thread(wanted, of, found, lsb_per_g)
     if not used or not files:
         return []
     chosen = [choice(method, preset) for method in used]
