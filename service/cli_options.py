@@ -7,9 +7,13 @@ import dataclasses
 import math
 import os
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from service.config import Settings
+from service.errors import ParameterError
+
+if TYPE_CHECKING:
+    from service.recordings import ColumnMapping
 
 DEFAULT_ID: Final = "sim-1"
 DEFAULT_NAME: Final = "Steplink"
@@ -58,10 +62,36 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--columns",
         metavar="time=T,x=X,y=Y,z=Z",
-        help="read texts as tables with these columns: names of the header, or numbers from 1; time may be missing",
+        help="read texts as tables with these columns: names of the header, or numbers from 1; time may be missing"
+        " where --rate-hz is given; gx, gy, gz (gyroscope), mx, my, mz (magnetometer, µT), steps (a 1 at each step, or"
+        " their running number) may be named too",
     )
-    parser.add_argument("--units", default="g", help="with --columns: acceleration in g, mg or m/s2 (default g)")
-    parser.add_argument("--time-unit", default="s", help="with --columns: time in s, ms, us or ns (default s)")
+    parser.add_argument("--units", metavar="UNIT", help="with --columns: acceleration in g, mg or m/s2 (default g)")
+    parser.add_argument("--time-unit", metavar="UNIT", help="with --columns: time in s, ms, us or ns (default s)")
+    parser.add_argument(
+        "--gyro-units", metavar="UNIT", help="with --columns: gyroscope in rad/s or deg/s (default rad/s)"
+    )
+    parser.add_argument(
+        "--rate-hz",
+        type=number(0.01, 10_000),
+        metavar="HZ",
+        help="samples a second, for files that hold neither time nor rate, 0.01–10000 Hz",
+    )
+
+
+def mapping(options: argparse.Namespace) -> ColumnMapping | None:
+    """Return which columns texts have, None where the options do not say; ParameterError for units of none."""
+    from service.recordings import column_mapping  # noqa: PLC0415
+
+    units = {"units": options.units, "time-unit": options.time_unit, "gyro-units": options.gyro_units}
+    given = {name: value for name, value in units.items() if value is not None}
+    if options.columns is not None:
+        return column_mapping(options.columns, options.units, options.time_unit, options.gyro_units)
+    for name, value in given.items():
+        raise ParameterError(
+            name, value, "it is the unit of named columns: --columns time=t,x=ax,y=ay,z=az is wanted too"
+        )
+    return None
 
 
 def add_bracelet(parser: argparse.ArgumentParser) -> None:
@@ -137,6 +167,12 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME.KEY=V",
         help="change one parameter of one counter, as in double_threshold.bout=3; may be repeated",
+    )
+    parser.add_argument(
+        "--calibrate",
+        metavar="WALK",
+        help="let counters learn before they count: `middle`, each recording from its own middle 300 samples"
+        " (double_threshold), or a file, a calibration walk (double_threshold, gyro_zero_crossing: as slow as ever)",
     )
     _add_json(parser, "write a row for each recording and counter there")
     parser.add_argument(

@@ -122,7 +122,7 @@ _compiled: set[tuple[str, str]] = set()
 def _compile_once(made: KernelCounter, block: SampleBlock, spare: StepCounter) -> None:
     key = (made.name, params_hash(made.params))
     if key not in _compiled and isinstance(spare, KernelCounter):
-        spare.count(_part(block, 0, WARM_UP_SAMPLES, as_lists=False))
+        spare.count(part(block, 0, WARM_UP_SAMPLES, as_lists=False))
         _compiled.add(key)
 
 
@@ -134,10 +134,12 @@ def streamed(counter: StepCounter, parts: Iterable[SampleBlock]) -> list[Step]:
 
 def pieces(block: SampleBlock, samples: int = COMPILED_FROM) -> list[SampleBlock]:
     """Cut `block` into lists of `samples`, short enough to go through plain Python."""
-    return [_part(block, first, first + samples, as_lists=True) for first in range(0, len(block), samples)]
+    return [part(block, first, first + samples, as_lists=True) for first in range(0, len(block), samples)]
 
 
-def _part(block: SampleBlock, first: int, last: int, *, as_lists: bool) -> SampleBlock:
+def part(block: SampleBlock, first: int, last: int, *, as_lists: bool) -> SampleBlock:
+    """Return samples `first` to `last`, the latter left out, of all sensors of `block`."""
+
     def cut(columns: Columns | None) -> Columns | None:
         if columns is None:
             return None

@@ -127,7 +127,7 @@ def _people(kind: str) -> Iterable[Floats]:
 
 def _kinds(file: Found, lsb_per_g: float, recorded: dict[str, str]) -> list[tuple[str, Source]]:
     try:
-        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping)
+        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping, rate_hz=file.rate_hz)
         kinds = [kind for kind, pattern in recorded.items() if _is(recording, kind, pattern)]
         return [(kind, _source(f"{file.dataset}/{file.path.name}", recording)) for kind in kinds]
     except SteplinkError:
