@@ -54,6 +54,7 @@ async def evaluate(
         with _ctrl_c_ignored():
             futures = [pool.submit(rows_of, file, chosen, lsb_per_g) for file in found]
         by_file = await asyncio.gather(*(rows(file, future) for file, future in zip(found, futures, strict=True)))
+        pool.shutdown()  # waited for: a pool that is still ending when Python ends may fail there
         return [row for made in by_file for row in made]
     except asyncio.CancelledError:
         for process in multiprocessing.active_children():

@@ -140,7 +140,7 @@ def test_ctrl_c_ends_a_bench_at_once(after_s):
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("after_s", [1.5, 3.0, 6.0])
+@pytest.mark.parametrize("after_s", [0.8, 2.0])
 def test_ctrl_c_ends_a_papers_tables_at_once(tmp_path, after_s):
     for k in range(60):
         save(walk(600, 100), tmp_path / "many" / f"{k}.npz", placement="wrist", activity="nothing")
