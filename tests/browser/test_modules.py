@@ -182,3 +182,22 @@ def test_a_likely_step_goes_where_it_is_counted_or_taken_back(run: Run) -> None:
     const likely = trace.likely.map((one) => [one.atS, presence(one, 5000)]);
     return [likely, trace.steps.map(({ wasLikely }) => wasLikely)];"""
     assert run(body) == [[[2, 0], [3, 1]], [False, True]]
+
+
+def test_a_session_begun_anew_begins_its_trace_anew(run: Run) -> None:
+    """A service that was restarted counts no reboot, but the bracelet's time may lie before what was drawn."""
+    body = """
+    const { Devices } = await import("/web/devices.js");
+    const devices = new Devices();
+    const device = { id: "a", address: "A", reboots: 0, primary: "p", counters: {}, steps: 0, steps_now: 0 };
+    const snapshot = (session_since) => ({ type: "snapshot", at: new Date().toISOString(),
+      devices: [{ ...device, session_since }] });
+    const signal = { type: "signal", device: "a", rate_hz: 50, values: new Array(100).fill(1) };
+    const shown = [];
+    for (const [since, fromS] of [["t1", 4], ["t1", 6], ["t2", 0]]) {
+      devices.apply(snapshot(since), 0);
+      devices.apply({ ...signal, from_s: fromS }, 0);
+      shown.push(devices.all[0].trace.beginS);
+    }
+    return shown;"""
+    assert run(body) == [4, 4, 0]

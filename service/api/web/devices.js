@@ -44,7 +44,8 @@ export class Devices {
       this.#entries.set(device.id, { device, trace: new Trace() });
       return true;
     }
-    if (device.reboots !== before.device.reboots) before.trace.reset();
+    const { reboots, session_since: since } = before.device; // a service that was restarted begins a session anew
+    if (device.reboots !== reboots || device.session_since !== since) before.trace.reset();
     before.device = device;
     return true;
   }
