@@ -90,7 +90,7 @@ def test_a_restarted_service_is_found_again(page: Page) -> None:
     expect(page.get_by_role("alert")).to_contain_text("was lost at", timeout=20_000)
     with running("demo", "--port", port, says=URL):
         expect(page.get_by_role("alert")).to_be_hidden(timeout=40_000)
-        wait_for_steps(page, 3)
+        wait_for_steps(page, 10)  # by then more is drawn than the veil over the last seconds covers
         assert sum(columns(page, "signal")) > 100
 
 
