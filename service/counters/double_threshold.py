@@ -66,6 +66,8 @@ from service.counters.streaming import Kernel, KernelCounter
 from service.errors import ParameterError
 from service.samples import GRID_HZ, Band, SampleBlock, Step
 
+ROW, STEP = kernel.ROW, kernel.STEP
+
 FILTER_DELAY: Final = 2
 """Samples by which the five-point mean lags."""
 
@@ -245,9 +247,9 @@ def _out_length(n: int, p: DoubleThresholdParams) -> int:
 def _events(rows: Sequence[float]) -> tuple[tuple[Step, ...], tuple[Band, ...]]:
     steps: list[Step] = []
     bands: list[Band] = []
-    for i in range(0, len(rows), kernel.ROW):
-        kind, a, b, c, d, e, f = rows[i : i + kernel.ROW]
-        if kind == kernel.STEP:
+    for i in range(0, len(rows), ROW):
+        kind, a, b, c, d, e, f = rows[i : i + ROW]
+        if kind == STEP:
             interval_s = b / GRID_HZ if b > 0.0 else None
             steps.append(Step((a - FILTER_DELAY) / GRID_HZ, c - d, interval_s, c, d, e, f))
         else:

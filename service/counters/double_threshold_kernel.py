@@ -289,14 +289,15 @@ def _valley(s: State, at: float, value: float, out: State, rows: int) -> int:
 
 def _close_window(s: State, to: float, out: State, rows: int) -> int:
     """Close the window that ends with sample `to`: its thresholds (9)–(16), then its peaks."""
+    high, low = s[HIGH], s[LOW]
     if s[PEAKS] > 0.0:
-        s[HIGH] = _mean(s[PEAK_SUM], s[PEAKS], s[HIGH], s[HIGH_KNOWN])
+        high = s[HIGH] = _mean(s[PEAK_SUM], s[PEAKS], high, s[HIGH_KNOWN])
         s[HIGH_KNOWN] = 1.0
     if s[VALLEYS_SEEN] > 0.0:
-        s[LOW] = _mean(s[VALLEY_SUM], s[VALLEYS_SEEN], s[LOW], s[LOW_KNOWN])
+        low = s[LOW] = _mean(s[VALLEY_SUM], s[VALLEYS_SEEN], low, s[LOW_KNOWN])
         s[LOW_KNOWN] = 1.0
     s[PEAK_SUM] = s[PEAKS] = s[VALLEY_SUM] = s[VALLEYS_SEEN] = 0.0
-    high, low, known = s[HIGH], s[LOW], s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    known = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
     upper, lower = (high + low) / 2.0, low + s[LOWER_SHARE] * (high - low)
     if known:
         rows = _row(out, rows, BAND, s[WINDOW_FROM], to, upper, lower, 0.0, 0.0)

@@ -194,10 +194,8 @@ class KernelCounter:
     def _scan_lists(self, columns: tuple[Column, ...], n: int) -> tuple[list[float], list[float]]:
         if n > self._room:
             self._room, self._out = n, [0.0] * self._room_for(n)
-        for column in columns:
-            if type(column) is not list:
-                columns = tuple(map(_as_list, columns))
-                break
+        if type(columns[0]) is not list:
+            columns = tuple(map(_as_list, columns))
         out = self._out
         end = self._scan(*columns, n, self._state, out)
         return out[:n], out[n:end] if end > n else []
