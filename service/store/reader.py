@@ -35,6 +35,8 @@ from service.store.values import (
 
 REPLAY_CHUNKS = 1000
 """Chunks of one page of `replay`."""
+SLICE_ROWS = 500
+"""Rows handled in one call while a long signal is read: a millisecond."""
 _LAST_RUN = 1 << 62
 """A run that none reaches."""
 
@@ -151,7 +153,7 @@ class Reader:
             WHERE session = ? AND sensor = ? AND (run, first) > (?, ?) AND (run, first) < (?, ?) ORDER BY run, first
         """
         values = (self._session(key), list(Sensor).index(sensor), low[0], low[1] - CHUNK_SAMPLES, *high)
-        return signal.assemble(self._rows(sql, *values), self._layouts(), sensor, low, high)
+        return signal.assemble(self._slices(sql, *values), self._layouts(), sensor, low, high)
 
     def replay(self, key: SessionKey, after: Cursor | None = None, *, limit: int = REPLAY_CHUNKS) -> ReplayPage:
         """Return what a session's device sent from the sample `after` on, in order, each sample once.
@@ -217,6 +219,12 @@ class Reader:
             number: (boot, Layout(rate_hz=rate, lsb_per_g=acc, lsb_per_rad_s=gyro, lsb_per_ut=mag))
             for number, boot, rate, acc, gyro, mag in self._rows(sql)
         }
+
+    def _slices(self, sql: str, *values: Any) -> Iterator[list[Any]]:  # noqa: ANN401
+        with told(self._path):
+            cursor = self._connection.execute(sql, values)
+            while rows := cursor.fetchmany(SLICE_ROWS):
+                yield rows
 
     def _rows(self, sql: str, *values: Any) -> list[Any]:  # noqa: ANN401
         with told(self._path):

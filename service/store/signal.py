@@ -5,7 +5,7 @@ Each value is the device's integer divided by its scale, as a codec makes it: bi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,17 +41,22 @@ class RawSignal:
 
 
 def assemble(
-    rows: Sequence[Sequence[Any]],
+    slices: Iterable[Sequence[Sequence[Any]]],
     layouts: Mapping[int, tuple[int, Layout]],
     sensor: Sensor,
     low: tuple[int, int],
     high: tuple[int, int],
 ) -> RawSignal:
-    """Return the samples in [low, high) of chunks (run, first, samples, layout, at_ns, counts) in order of place."""
-    if not rows:
-        return RawSignal(sensor=sensor, values=np.empty((0, 3)), spans=())
-    run, first, samples, layout, at_ns = np.array([row[:5] for row in rows], dtype=np.int64).T
-    counts = np.frombuffer(b"".join([row[5] for row in rows]), dtype="<i2").reshape(-1, 3)
+    """Return the samples in [low, high) of chunks (run, first, samples, layout, at_ns, counts) in order of place.
+
+    The rows come in slices, so that no single call keeps other threads waiting for long.
+    """
+    heads, columns = [np.empty((0, 5), dtype=np.int64)], [np.empty((0, 3), dtype="<i2")]
+    for rows in slices:
+        heads.append(np.array([row[:5] for row in rows], dtype=np.int64))
+        columns.append(np.frombuffer(b"".join([row[5] for row in rows]), dtype="<i2").reshape(-1, 3))
+    run, first, samples, layout, at_ns = np.concatenate(heads).T
+    counts = np.concatenate(columns)
     begin, end = _once(run, first, first + samples, low, high)
     kept = np.maximum(end - begin, 0)
     if not np.array_equal(kept, samples):
@@ -92,8 +97,8 @@ def _scale(
 ) -> float | NDArray[np.float64]:
     """Return the units in one of ours: one number where it never changed, else one for each sample."""
     scales = {number: _lsb(layouts[number][1], sensor) for number in np.unique(layout).tolist()}
-    if len(set(scales.values())) == 1:
-        return next(iter(scales.values()))
+    if len(set(scales.values())) <= 1:
+        return next(iter(scales.values()), 1.0)
     return np.repeat(np.array([scales[number] for number in layout.tolist()]), kept)[:, np.newaxis]
 
 
@@ -113,9 +118,9 @@ def _spans(
 ) -> list[Span]:
     """Join chunks that follow each other."""
     follows = (run[1:] == run[:-1]) & (layout[1:] == layout[:-1]) & (begin[1:] == begin[:-1] + kept[:-1])
-    heads = np.concatenate(([0], np.flatnonzero(~follows) + 1)) if len(run) else np.empty(0, dtype=np.int64)
+    heads = np.concatenate(([0], np.flatnonzero(~follows) + 1))[: len(run)]
     rows = np.concatenate(([0], np.cumsum(kept)))
-    ends = np.append(heads[1:], len(run))
+    ends = np.append(heads, len(run))[1:]
     spans = []
     for head, end in zip(heads.tolist(), ends.tolist(), strict=True):
         boot, units = layouts[int(layout[head])]
