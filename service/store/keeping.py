@@ -103,9 +103,7 @@ def go_on_forgetting(scribe: Scribe) -> Steps:
         )
     scribe.forget_numbers()
     yield
-    connection.execute(
-        "VACUUM"
-    )  # rows that once lay elsewhere leave copies in pages, which secure_delete does not know
+    _rewrite(connection)
     yield from _empty_journal(connection)
     with transaction(connection):
         connection.execute("DELETE FROM persons WHERE forgotten = 1")
@@ -130,7 +128,8 @@ def _retain_raw(connection: sqlite3.Connection, policy: Retention) -> Steps:
         with transaction(connection):
             rows = _delete_slice(connection, session, sensor, before_ns)
         deleted += rows
-        if rows and (head := _head(connection, session, sensor)) is not None:
+        # A column that gave less has no more to give, or only what arrived meanwhile: that is not chased.
+        if rows == SLICE_ROWS and (head := _head(connection, session, sensor)) is not None:
             heapq.heappush(heap, (head, session, sensor))
         yield
     return deleted
@@ -229,8 +228,14 @@ def _delete_events(connection: sqlite3.Connection, session: int) -> Generator[No
 def _shrink(connection: sqlite3.Connection) -> Generator[None, None, None]:
     """Give free pages back to the file system."""
     while connection.execute("PRAGMA freelist_count").fetchone()[0]:
-        connection.execute(f"PRAGMA incremental_vacuum({SLICE_PAGES})").fetchall()
+        # As a script: executed as a statement without columns, it stops after its first page.
+        connection.executescript(f"PRAGMA incremental_vacuum({SLICE_PAGES})")
         yield
+
+
+def _rewrite(connection: sqlite3.Connection) -> None:
+    """Write the file anew: pages among which rows were moved keep copies of them, which secure_delete does not know."""
+    connection.execute("VACUUM")
 
 
 def _empty_journal(connection: sqlite3.Connection) -> Generator[None, None, None]:
