@@ -6,6 +6,8 @@ the same chunks, so that storing them again after a crash finds them there.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from service.errors import ParameterError
@@ -42,6 +44,19 @@ class Chunker:
 def chunk_samples(rate_hz: float) -> int:
     """Return how many samples a whole chunk has: a second's, within what one may have."""
     return min(CHUNK_SAMPLES, max(1, round(rate_hz)))
+
+
+def by_stretch(chunk: Chunk) -> Iterator[Chunk]:
+    """Yield a chunk in pieces as packets are: `ticks[0]` is that of the stretch a piece begins in.
+
+    A stretch whose tick is not known goes with the one before it, as it came.
+    """
+    first = chunk.index
+    for k, tick in enumerate(chunk.ticks[1:], first // TICK_EVERY + 1):
+        if tick is not None:
+            yield codec.cut(chunk, first, k * TICK_EVERY)
+            first = k * TICK_EVERY
+    yield codec.cut(chunk, first, chunk.end)
 
 
 def counts(columns: Columns, lsb: float) -> bytes:

@@ -56,8 +56,7 @@ def bytes_of(first, end, seed=0):
 async def check_what_was_appended_is_there_after_a_restart(reopen):
     batches = [made.second(KEY, k) for k in range(5)]
     async with reopen() as store:
-        for batch in batches:
-            await store.append(batch)
+        await asyncio.gather(*(store.append(batch) for batch in batches))
         before = await everything(store)
     async with reopen() as store:
         assert await everything(store) == before
@@ -75,8 +74,7 @@ async def check_appending_again_in_any_order_changes_nothing(reopen):
         await asyncio.gather(*(store.append(batch) for batch in made.shuffled(batches, 2)))
         assert await everything(store) == before
     async with reopen() as store:
-        for batch in made.shuffled(batches, 3):
-            await store.append(batch)
+        await asyncio.gather(*(store.append(batch) for batch in made.shuffled(batches, 3)))
         assert await everything(store) == before
 
 
@@ -163,8 +161,8 @@ async def check_raw_samples_each_once_and_in_order(reopen):
     """Chunks that came late, that lie over each other, and a device that started again."""
     late = [made.chunk(200, 250), made.chunk(0, 30), made.chunk(0, 50), made.chunk(40, 90), made.chunk(60, 80)]
     async with reopen() as store:
-        for chunk in [*late, made.chunk(0, 50, run=1)]:
-            await store.append(Batch(session=KEY, chunks=(chunk,)))
+        chunks = [*late, made.chunk(0, 50, run=1)]
+        await asyncio.gather(*(store.append(Batch(session=KEY, chunks=(chunk,))) for chunk in chunks))
     async with reopen() as store:
         raw = await signal(store)
         spans = [(span.run, span.index, span.samples, span.row) for span in raw.spans]
@@ -229,8 +227,7 @@ async def check_a_persons_data_go_for_good(reopen):
 async def check_old_raw_samples_go_and_steps_stay(reopen):
     """Oldest first; not those that a restart needs, those after the snapshot."""
     async with reopen() as store:
-        for k in range(20):
-            await store.append(made.second(KEY, k))
+        await asyncio.gather(*(store.append(made.second(KEY, k)) for k in range(20)))
         await store.append(Batch(session=KEY, snapshot=made.snapshot(500)))
         since_ns = made.SINCE_NS + 15 * made.SECOND_NS
         await store.retain(Retention(raw_since_ns=since_ns))

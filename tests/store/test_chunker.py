@@ -11,7 +11,7 @@ from store import made
 
 from service.errors import ParameterError
 from service.samples import TICK_EVERY, RawBlock
-from service.store.chunker import Chunker, chunk_samples, counts
+from service.store.chunker import Chunker, by_stretch, chunk_samples, counts
 from service.store.values import Layout
 
 INTEGERS = st.integers(-32768, 32767)
@@ -58,6 +58,13 @@ def test_every_stretch_keeps_its_tick():
     assert {stretch: {tick for tick in known if tick is not None} for stretch, known in ticks.items()} == {
         stretch: {made.tick(stretch)} for stretch in range(8)
     }
+
+
+def test_pieces_have_the_tick_of_the_stretch_they_begin_in():
+    whole = dataclasses.replace(made.chunk(100, 228), ticks=(made.tick(0), made.tick(1)))
+    assert list(by_stretch(whole)) == [made.chunk(100, 128), made.chunk(128, 228)]
+    unknown = dataclasses.replace(whole, ticks=(made.tick(0), None))
+    assert list(by_stretch(unknown)) == [unknown]
 
 
 def test_a_hole_ends_a_chunk():
