@@ -128,7 +128,7 @@ class Store:
         if not await asyncio.to_thread(self._writer.close, CLOSE_S):
             for future in [future for future in self._waiting if not future.done()]:
                 future.set_exception(StoreError(StoreFault.CLOSED, "the disk did not answer before the store closed"))
-        await asyncio.to_thread(self._threads.shutdown)
+        await asyncio.to_thread(self._threads.shutdown, cancel_futures=True)
         for connection in self._connections:
             connection.close()
 

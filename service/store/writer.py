@@ -9,6 +9,7 @@ small transaction at a time, so that it never holds up recording.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import logging
 import sqlite3
 import threading
@@ -101,8 +102,7 @@ class Writer:
 
     def statistics(self) -> WriterStatistics:
         """Return how it does."""
-        self._told.queued = len(self._orders)
-        return self._told
+        return dataclasses.replace(self._told, queued=len(self._orders))
 
     def _take(self, append: Callable[[Any], None], order: object) -> None:
         with self._changed:
@@ -114,11 +114,22 @@ class Writer:
     # In the thread
 
     def _run(self) -> None:
-        while (group := self._gather()) is not None:
-            if group:
-                self._record(group)
-            self._advance_job()
-        self._drop_connection(last=True)
+        group: list[_Order] | None = None
+        try:
+            while (group := self._gather()) is not None:
+                if group:
+                    self._record(group)
+                group = None
+                self._advance_job()
+            self._drop_connection(last=True)
+        finally:  # however it ends, nobody waits for ever
+            with self._changed:
+                self._closing = True
+            closed = StoreError(StoreFault.CLOSED, "the store was closed before this was done: ask again")
+            _tell([*(group or ()), *self._orders], closed)
+            self._end_job(closed)
+            for _, done in self._jobs:
+                done(closed, None)
 
     def _gather(self) -> list[_Order] | None:
         """Wait for work; return the next group (none: there is only a job), None when all is done and closing."""
@@ -128,10 +139,7 @@ class Writer:
                 rest_s = self._orders[0].at_s + GROUP_S - time.monotonic()
                 self._changed.wait_for(lambda: self._closing or len(self._orders) >= GROUP_BATCHES, max(0.0, rest_s))
             group = [self._orders.popleft() for _ in range(min(len(self._orders), GROUP_BATCHES))]
-            if not group and self._closing:
-                self._refuse_jobs()
-                return None
-            return group
+            return None if not group and self._closing else group
 
     def _record(self, group: list[_Order]) -> None:
         """Write a group, however long that takes."""
@@ -159,6 +167,7 @@ class Writer:
         except (sqlite3.Error, OSError) as error:
             fault = store_error(error, self._path)
             if fault.is_passing and fault.reason is not StoreFault.FULL:
+                self._end_job(fault)
                 self._drop_connection()
         except StoreError as error:
             fault = error
@@ -188,33 +197,31 @@ class Writer:
             return not self._changed.wait_for(lambda: self._closing, self._retry_s)
 
     def _advance_job(self) -> None:
-        """Do one transaction of the job at hand."""
-        if self._running is None:
-            with self._changed:
-                job, done = self._jobs.popleft() if self._jobs else (None, None)
-            if job is None or done is None:
-                return
-            try:
-                self._running = job(self._ready_scribe()), done
-            except (sqlite3.Error, OSError) as error:
-                done(store_error(error, self._path), None)
-                return
-        steps, done = self._running
+        """Do one transaction of the job at hand, or of the next."""
         try:
-            next(steps)
+            if self._running is None:
+                if not self._jobs:
+                    return
+                job, done = self._jobs.popleft()
+                self._running = _first_then(job, self._ready_scribe), done
+            next(self._running[0])
         except StopIteration as end:
-            self._running = None
-            done(None, end.value)
-        except (sqlite3.Error, OSError, StoreError) as error:
-            self._running = None
-            done(error if isinstance(error, StoreError) else store_error(error, self._path), None)
+            self._end_job(None, end.value)
+        except (sqlite3.Error, OSError) as error:
+            self._end_job(store_error(error, self._path))
+        except StoreError as error:
+            self._end_job(error)
+        except Exception as error:  # a fault of ours in a job must not end recording
+            logger.exception("a job of the store")
+            self._end_job(StoreError(StoreFault.REFUSED, f"this cannot be done: {error!r}"))
 
-    def _refuse_jobs(self) -> None:
-        closed = StoreError(StoreFault.CLOSED, "the store was closed before this was done: ask again")
+    def _end_job(self, fault: StoreError | None, result: object = None) -> None:
+        """Tell how the job at hand ended, if there is one."""
         if self._running is not None:
-            self._running[1](closed, None)
-        for _, done in self._jobs:
-            done(closed, None)
+            (_, done), self._running = self._running, None
+            if fault is not None and self._scribe is not None:
+                self._scribe.forget_numbers()
+            done(fault, result)
 
     def _ready_scribe(self) -> Scribe:
         if self._scribe is None:
@@ -229,6 +236,11 @@ class Writer:
                     self._scribe.connection.execute("PRAGMA optimize")
                 self._scribe.connection.close()
         self._scribe = None
+
+
+def _first_then(job: Job, ready: Callable[[], Scribe]) -> Generator[None, None, Any]:
+    """Return a job that opens the connection itself, so that a fault in that is the job's."""
+    return (yield from job(ready()))
 
 
 def _tell(group: list[_Order], fault: StoreError | None) -> None:

@@ -192,6 +192,36 @@ async def test_damage_is_told_and_not_waited_out(opened, disk):
         assert store.statistics().trouble is error.value
 
 
+async def test_a_job_that_fails_ends_alone(opened, disk):
+    def stumbling(scribe):
+        yield
+        raise KeyError(scribe)
+
+    async with opened() as store:
+        with pytest.raises(StoreError) as error:
+            await store._run(stumbling)
+        assert error.value.reason is StoreFault.REFUSED
+        disk.fault = sqlite3.SQLITE_IOERR
+        with pytest.raises(StoreError) as error:
+            await store.assign("sim-1", "ann")
+        assert error.value.reason is StoreFault.IO
+        disk.fault = None
+        await store.append(made.second(KEY, 0))
+        assert await store.assign("sim-1", "ann") == 1
+
+
+async def test_a_writer_that_dies_leaves_nobody_waiting(opened, monkeypatch):
+    died = []
+    monkeypatch.setattr("threading.excepthook", died.append)
+    async with opened() as store:
+        monkeypatch.setattr(store._writer, "_record", None)
+        for _ in range(2):
+            with pytest.raises(StoreError) as error:
+                await store.append(made.second(KEY, 0))
+            assert error.value.reason is StoreFault.CLOSED
+    assert len(died) == 1
+
+
 async def test_closing_while_nothing_can_be_written_does_not_wait(opened, disk):
     async with opened() as store:
         disk.fault = sqlite3.SQLITE_FULL
