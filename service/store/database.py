@@ -16,6 +16,8 @@ from service.errors import StoreError, StoreFault
 from service.store.faults import store_error, told
 from service.store.schema import APPLICATION_ID, MIGRATIONS
 
+SQLITE_NEEDED = (3, 37)
+"""The first with STRICT tables, which refuse a value of the wrong type (numpy's integers would be kept as bytes)."""
 CHECKED_BYTES = 256 << 20
 """A file up to this size is checked whole when it is opened (a second); `check` does it for any size."""
 BUSY_MS = 2000
@@ -32,6 +34,10 @@ Migrations = Sequence[Sequence[str]]
 
 def prepare(path: Path, migrations: Migrations = MIGRATIONS) -> None:
     """Make the database at `path`, or check it and bring it to the newest version; StoreError says what is wrong."""
+    if sqlite3.sqlite_version_info < SQLITE_NEEDED:
+        needed = ".".join(map(str, SQLITE_NEEDED))
+        why = f"this Python has SQLite {sqlite3.sqlite_version}: use one with {needed} or later"
+        raise StoreError(StoreFault.REFUSED, why)
     with told(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))

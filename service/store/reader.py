@@ -14,6 +14,7 @@ from typing import Any
 
 from service.samples import Sensor
 from service.store import codec, database, keeping, signal
+from service.store.contract import RawReading, Reading
 from service.store.faults import told
 from service.store.signal import RawSignal
 from service.store.values import (
@@ -229,6 +230,10 @@ class Reader:
     def _rows(self, sql: str, *values: Any) -> list[Any]:  # noqa: ANN401
         with told(self._path):
             return self._connection.execute(sql, values).fetchall()
+
+
+PROMISES: tuple[type[Reading], type[RawReading]] = (Reader, Reader)
+"""The contract that the type checker holds a Reader to."""
 
 
 def _plain(text: str | None) -> dict[str, Any] | None:

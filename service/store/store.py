@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 from service.errors import StoreError, StoreFault
 from service.store import database, keeping
+from service.store.contract import Keeper, Recorder
 from service.store.faults import told
 from service.store.keeping import Retention
 from service.store.reader import Reader
@@ -31,7 +32,11 @@ CLOSE_S = 2.0
 READERS = 2
 """Threads that read: one long export leaves one for everybody else."""
 
+_BUSY = "the disk is too slow for what arrives: record fewer devices or move the database to a faster disk"
+
 Result = TypeVar("Result")
+
+logger = logging.getLogger(__name__)
 
 
 class Store:
@@ -133,9 +138,8 @@ class Store:
             connection.close()
 
 
-logger = logging.getLogger(__name__)
-
-_BUSY = "the disk is too slow for what arrives: record fewer devices or move the database to a faster disk"
+PROMISES: tuple[type[Recorder], type[Keeper]] = (Store, Store)
+"""The contract that the type checker holds a Store to."""
 
 
 @contextlib.asynccontextmanager

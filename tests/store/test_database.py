@@ -1,8 +1,10 @@
 """The file: made, refused, migrated, and never left half way."""
 
 import contextlib
+import dataclasses
 import sqlite3
 
+import numpy as np
 import pytest
 from store import made
 
@@ -10,6 +12,7 @@ from service.errors import StoreError, StoreFault
 from service.store import database
 from service.store.schema import APPLICATION_ID, MIGRATIONS
 from service.store.store import open_store
+from service.store.values import Batch
 
 LATER = (*MIGRATIONS, ("ALTER TABLE devices ADD COLUMN colour TEXT", "UPDATE devices SET colour = 'grey'"))
 
@@ -84,6 +87,21 @@ async def test_a_newer_file_is_refused(filled):
     error = await refused(filled)
     assert error.reason is StoreFault.NEWER
     assert "a later" in error.why
+
+
+def test_an_old_sqlite_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(sqlite3, "sqlite_version_info", (3, 34, 1))
+    with pytest.raises(StoreError, match=r"3\.37 or later"):
+        database.prepare(tmp_path / "s.db")
+    assert list(tmp_path.iterdir()) == []
+
+
+async def test_a_value_of_the_wrong_type_is_refused(tmp_path):
+    wrong = dataclasses.replace(made.step(1), run=np.int64(0))
+    async with open_store(tmp_path / "s.db", queue_batches=10) as store:
+        with pytest.raises(StoreError) as error:
+            await store.append(Batch(session=made.session(), entries=(wrong,)))
+        assert error.value.reason is StoreFault.REFUSED
 
 
 async def test_other_files_are_refused_and_left_alone(tmp_path):

@@ -160,9 +160,9 @@ async def test_a_folder_that_is_read_only(tmp_path):
     ("code", "reason"),
     [
         (sqlite3.SQLITE_FULL, StoreFault.FULL),
-        (sqlite3.SQLITE_READONLY, StoreFault.READ_ONLY),
+        pytest.param(sqlite3.SQLITE_READONLY, StoreFault.READ_ONLY, marks=pytest.mark.full),
         (sqlite3.SQLITE_IOERR_FSYNC, StoreFault.IO),
-        (sqlite3.SQLITE_BUSY, StoreFault.LOCKED),
+        pytest.param(sqlite3.SQLITE_BUSY, StoreFault.LOCKED, marks=pytest.mark.full),
     ],
 )
 async def test_a_passing_fault_is_waited_out(opened, disk, code, reason):

@@ -57,6 +57,7 @@ def test_chunks_in_any_order_give_every_sample_once(spans, random):
             assert reader.resume()[0].cursor.place == max((run, first) for run, first, _ in spans)
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 400), st.integers(1, 400), st.integers(1, 9))
 def test_pages_of_any_size_from_anywhere_give_the_rest(start, stop, limit):
     chunks = [made.chunk(first, first + 37) for first in range(0, 400, 29)]
@@ -72,6 +73,7 @@ def test_pages_of_any_size_from_anywhere_give_the_rest(start, stop, limit):
         assert (raw.values * 4096).astype("<i2").tobytes() == made.column(start, max(start, stop))
 
 
+@settings(max_examples=40)
 @given(
     st.builds(
         Step,
