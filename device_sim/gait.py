@@ -5,9 +5,12 @@ acceleration has four harmonics of the step rate, stronger for one foot; steps v
 numbers are in `gait_profiles`, each with the recordings it was measured on. Everything follows from the seed: the
 same walker gives the same samples, however they are asked for.
 
-`sensed` adds the angular rate and the Earth's field that the same attitude gives: on eth2023 the arm's main axis turns
+`sensors` adds the angular rate and the Earth's field that the same attitude gives: on eth2023 the arm's main axis turns
 at 84°/s (median of 62 windows of 4 s, standard deviation), the normal row at 68; a second axis with half of that there
 is left out here.
+
+`mirrored` is the same person's other wrist: the same steps at the same moments, the arm half a stride behind, every
+sideways motion the other way, a watch that faces outwards on that side too, and its own noise.
 
 Left out: forward and sideways acceleration of the body, turns of the wearer, fatigue.
 """
@@ -15,9 +18,10 @@ Left out: forward and sideways acceleration of the body, turns of the wearer, fa
 from __future__ import annotations
 
 import bisect
+import dataclasses
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -36,6 +40,7 @@ from device_sim.gait_profiles import (
 )
 from device_sim.gait_schedule import ACTIVITIES, Segment, parse_schedule
 from service.errors import ParameterError
+from service.samples import ACCELEROMETER_ONLY, Sensor, Sensors
 
 __all__ = ["ACTIVITIES", "Segment", "Sensed", "Walker", "parse_schedule"]
 
@@ -43,6 +48,8 @@ Floats = NDArray[np.float64]
 
 _BLOCK: Final = 512
 """Samples made at a time: fixed, so that noise does not depend on how samples are asked for."""
+_OUTWARDS: Final = np.array([[-1.0], [-1.0], [1.0]])
+"""What half a turn about the forearm makes of the sensor's forward, sideways and upward directions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,12 +62,14 @@ class Sensed:
 
 
 class Walker:
-    """Acceleration in g (n×3, gravity included) of somebody who follows `schedule`; a `device_sim.source.Source`.
+    """Acceleration (g, gravity included) of somebody who follows `schedule`; a `device_sim.source.Source`.
 
+    `sensors` says whether angular rate (rad/s) and field (µT) stand beside it; they change nothing in it.
     `gravity` is the direction, in the sensor's axes, of what it reads while the arm hangs still. `strength` scales
     the impacts and their roughness, `arm_m` is the length from shoulder to sensor, `noise_g` the sensor's white
     noise. `gaits` are the rows of its gaits, where the sensor is worn elsewhere than at the wrist. With `loop` the
-    schedule begins again for ever, with other variations. ParameterError where a value is out of range.
+    schedule begins again for ever, with other variations. `mirrored` is the other wrist. ParameterError where a value
+    is out of range.
     """
 
     def __init__(
@@ -75,6 +84,8 @@ class Walker:
         arm_m: float = ARM_M,
         noise_g: float = SENSOR_NOISE_G,
         gaits: Mapping[str, Gait] = GAITS,
+        sensors: Collection[Sensor] = ACCELEROMETER_ONLY,
+        mirrored: bool = False,
     ) -> None:
         self.schedule = parse_schedule(schedule) if isinstance(schedule, str) else tuple(schedule)
         if not self.schedule:
@@ -89,11 +100,14 @@ class Walker:
         self._rate_hz = rate_hz
         self._loop = loop
         self._seed = seed
-        self._wearer = Wearer(strength=strength, arm_m=arm_m, gaits=gaits)
-        self._axes = _axes(gravity)
+        self._sensors = tuple(sensor for sensor in Sensor if sensor in {*ACCELEROMETER_ONLY, *sensors})
+        self._mirrored = mirrored
+        worn = {name: _half_a_stride_later(gait) for name, gait in gaits.items()} if mirrored else gaits
+        self._wearer = Wearer(strength=strength, arm_m=arm_m, gaits=worn)
+        self._axes = _axes(gravity) * (_OUTWARDS if mirrored else 1.0)
         self._noise_g = noise_g
         self._blocks = self._make_blocks()
-        self._left: Floats = np.empty((0, 3))
+        self._left: Floats = np.empty((0, 3 * len(self._sensors)))
         self._starts_s = [0.0, *itertools.accumulate(segment.duration_s for segment in self.schedule)]
         self._step_t_s: list[float] = []
         self._known = 0
@@ -104,12 +118,17 @@ class Walker:
         return self._rate_hz
 
     @property
+    def sensors(self) -> Sensors:
+        """What a sample holds."""
+        return self._sensors
+
+    @property
     def duration_s(self) -> float:
         """Length of the schedule, once through, in seconds."""
         return self._starts_s[-1]
 
     def read(self, n: int) -> Floats:
-        """Return the next n×3 samples in g; fewer at the end, then none, unless it loops."""
+        """Return the next n samples, three columns a sensor; fewer at the end, then none, unless it loops."""
         parts, have = [self._left], len(self._left)
         while have < n and (block := next(self._blocks, None)) is not None:
             parts.append(block)
@@ -121,20 +140,13 @@ class Walker:
     def sensed(self) -> Sensed:
         """Return the whole schedule, once through, with angular rate and field; what has been read changes nothing.
 
-        The acceleration is what `read` gives, bit for bit.
+        These are the samples that `read` gives, bit for bit.
         """
-        acc_g, gyro_rad_s, mag_ut = [], [], []
-        for number in range(len(self.schedule)):
-            laid = self._course(number)
-            rng = np.random.default_rng((self._seed, number, 2))
-            spread = math.hypot(laid.rough_rad_s, SENSOR_NOISE_RAD_S)
-            for t_s, acceleration in self._segment_blocks(number, laid):
-                noise = rng.standard_normal((2, len(t_s), 3))
-                acc_g.append(acceleration)
-                gyro_rad_s.append((laid.rate_rad_s(t_s) + spread * noise[0]) @ self._axes)
-                mag_ut.append((laid.field_ut(t_s, EARTH_UT) + SENSOR_NOISE_UT * noise[1]) @ self._axes)
-        parts = (np.concatenate(part) for part in (acc_g, gyro_rad_s, mag_ut))
-        return Sensed(**dict(zip(("acc_g", "gyro_rad_s", "mag_ut"), parts, strict=True)))
+        blocks = [
+            block for number in range(len(self.schedule)) for block in self._segment_blocks(number, tuple(Sensor))
+        ]
+        acc_g, gyro_rad_s, mag_ut = np.hsplit(np.concatenate(blocks), len(Sensor))
+        return Sensed(acc_g=acc_g, gyro_rad_s=gyro_rad_s, mag_ut=mag_ut)
 
     def true_steps_until(self, t_s: float) -> int:
         """Return the steps taken up to `t_s` seconds after the start."""
@@ -157,25 +169,45 @@ class Walker:
         """Lay out the `number`-th segment since the start; the same each time it is asked for."""
         segment = self.schedule[number % len(self.schedule)]
         rng = np.random.default_rng((self._seed, number))
-        return course(segment, self._start_s(number), self._wearer, rng)
+        laid = course(segment, self._start_s(number), self._wearer, rng)
+        return _mirrored(laid) if self._mirrored else laid
 
     def _make_blocks(self) -> Iterator[Floats]:
         for number in itertools.count() if self._loop else range(len(self.schedule)):
-            for _, acceleration in self._segment_blocks(number, self._course(number)):
-                yield acceleration
+            yield from self._segment_blocks(number, self._sensors)
 
-    def _segment_blocks(self, number: int, laid: Course) -> Iterator[tuple[Floats, Floats]]:
-        """Yield the times of the `number`-th segment's samples and their acceleration, block by block."""
-        rng = np.random.default_rng((self._seed, number, 1))
+    def _segment_blocks(self, number: int, sensors: Sensors) -> Iterator[Floats]:
+        """Yield the samples of the `number`-th segment, block by block."""
+        laid = self._course(number)
+        rng, other_rng = (np.random.default_rng((self._seed, number, use + 2 * self._mirrored)) for use in (1, 2))
+        spread = math.hypot(laid.rough_rad_s, SENSOR_NOISE_RAD_S)
         first, last = (self._first_index(self._start_s(at)) for at in (number, number + 1))
         for block in range(first, last, _BLOCK):
             t_s = np.arange(block, min(block + _BLOCK, last)) / self._rate_hz
             noise = rng.standard_normal((len(t_s), 3)) * math.hypot(laid.rough_g, self._noise_g)
-            yield t_s, (laid.arm_g(t_s) + noise) @ self._axes
+            columns = [(laid.arm_g(t_s) + noise) @ self._axes]
+            if sensors != ACCELEROMETER_ONLY:
+                # Drawn for both: what is asked for must not change the noise of the other.
+                for_gyro, for_mag = other_rng.standard_normal((2, len(t_s), 3))
+                if Sensor.GYROSCOPE in sensors:
+                    columns.append((laid.rate_rad_s(t_s) + spread * for_gyro) @ self._axes)
+                if Sensor.MAGNETOMETER in sensors:
+                    columns.append((laid.field_ut(t_s, EARTH_UT) + SENSOR_NOISE_UT * for_mag) @ self._axes)
+            yield np.hstack(columns)
 
     def _first_index(self, t_s: float) -> int:
         """Return the first sample at or after `t_s`; a hair before counts as at."""
         return math.ceil(t_s * self._rate_hz - 1e-6)
+
+
+def _half_a_stride_later(gait: Gait) -> Gait:
+    return dataclasses.replace(gait, swing_lag_rad=gait.swing_lag_rad + math.pi)
+
+
+def _mirrored(laid: Course) -> Course:
+    """Return the course with left and right exchanged; its turns follow from where they lead."""
+    ahead, aside = laid.turn_to
+    return dataclasses.replace(laid, arm_g=lambda t_s: laid.arm_g(t_s) * (1.0, -1.0, 1.0), turn_to=(ahead, -aside))
 
 
 def _axes(gravity: tuple[float, float, float]) -> Floats:

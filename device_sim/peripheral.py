@@ -21,6 +21,7 @@ from device_sim.bracelet import Bracelet
 from device_sim.controller import AirHost
 from device_sim.operations import Operations
 from service.errors import LinkError, LinkFault, ParameterError
+from service.samples import ACCELEROMETER_ONLY
 from service.wearables import bracelet as wire
 
 HCI_TIMEOUT_S: Final = 5.0
@@ -249,11 +250,15 @@ def _services(bracelet: Bracelet, data: Characteristic[bytes], battery: Characte
     def text(uuid: str, value: str) -> Characteristic[bytes]:
         return _characteristic(uuid, _P.READ, value.encode)
 
+    # As old firmware has it: who measures acceleration only need not say so.
+    more = bracelet.sensors != ACCELEROMETER_ONLY
+    sensors = [_characteristic(wire.SENSORS, _P.READ, bracelet.sensors_value)] if more else []
     return [
         Service(
             wire.SERVICE,
             [
                 data,
+                *sensors,
                 _characteristic(wire.SCALE, _P.READ, bracelet.scale_value),
                 _characteristic(wire.RATE, _P.READ, bracelet.rate_value),
                 _characteristic(wire.BOOT, _P.READ, bracelet.boot_value),

@@ -1,8 +1,9 @@
 """The commands: `steplink demo`, `serve`, `scan`, `sim`, `evaluate`, `bench`, `counters`.
 
-Ctrl-C or SIGTERM ends each cleanly with exit code 0; a wrong option, file or port ends it with one line and exit code
-2; no Bluetooth with one line and exit code 3; an evaluation without a single count with exit code 1. Nothing heavy is
-imported before a command needs it.
+Ctrl-C or SIGTERM ends each cleanly: with exit code 0 those that go on until they are told to end, with 130 or 143 those
+whose result is then missing. A wrong option, file or port ends a command with one line and exit code 2; no Bluetooth
+with one line and exit code 3; an evaluation without a single count with exit code 1. Nothing heavy is imported before a
+command needs it.
 """
 
 from __future__ import annotations
@@ -18,22 +19,19 @@ from collections.abc import Callable, Coroutine, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from service import cli_options
+from service import cli_evaluation, cli_options
+from service.cli_output import say, spell_out
+from service.cli_stop import Stopped, stopped_at_once, tell
 from service.config import Settings
-from service.errors import LinkError, SteplinkError
+from service.errors import LinkError, ParameterError, SteplinkError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    from device_sim.bracelet import Bracelet
     from device_sim.gatt import GattBracelet
     from device_sim.source import Source
-    from service.evaluation.choices import Found
-    from service.evaluation.rows import Row
     from service.links.ble import Backend
     from service.pipeline.supervisor import Supervisor
-    from service.recordings import ColumnMapping
 
-NOTHING_COUNTED = 1
 USAGE_ERROR = 2
 NO_BLUETOOTH = 3
 BOOT_NS = 50_000_000
@@ -44,11 +42,18 @@ Command = Callable[[argparse.Namespace], Coroutine[Any, Any, int | None]]
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
+    spell_out()
     options = _parser().parse_args(argv)
     logging.basicConfig(level=logging.WARNING, format="steplink: %(message)s")
     logging.getLogger("bumble").setLevel(logging.CRITICAL)  # what a lost link leaves behind is no news to a user
     try:
+        if not options.endless:
+            with stopped_at_once():
+                return asyncio.run(options.command(options)) or 0
         return asyncio.run(_stoppable(options.command(options))) or 0
+    except Stopped as stopped:
+        tell()
+        return stopped.code
     except (KeyboardInterrupt, asyncio.CancelledError):
         return 0
     except LinkError as error:
@@ -74,12 +79,16 @@ async def _demo(options: argparse.Namespace) -> None:
     from service.links.ble import Backend  # noqa: PLC0415
 
     settings = _settings(options)
-    bracelet = _bracelet(options)
-    async with LocalAir() as air, _on_air(air, bracelet, options) as worn, air.central() as central:
+    bracelets = _bracelets(options)
+    async with LocalAir() as air, contextlib.AsyncExitStack() as worn:
+        played = [
+            await worn.enter_async_context(_on_air(air, bracelet, name, options))
+            for name, bracelet in bracelets.items()
+        ]
+        central = await worn.enter_async_context(air.central())
         backend = Backend(scanner=central.scanner, client=central.client)
         await _side_by_side(
-            _serve_with(settings, _supervisor(settings, backend, wanted=None)),
-            _take_off(worn),
+            _serve_with(settings, _supervisor(settings, backend, wanted=None)), *(_take_off(one) for one in played)
         )
 
 
@@ -99,7 +108,7 @@ async def _side_by_side(*works: Coroutine[Any, Any, None]) -> None:
 async def _take_off(worn: GattBracelet) -> None:
     """Take a bracelet that has nothing more to play off the air."""
     await worn.until_played()
-    print("the recording has been played; the bracelet leaves", flush=True)
+    say("the recording has been played; the bracelet leaves")
     await worn.go_away()
 
 
@@ -118,9 +127,9 @@ async def _scan(options: argparse.Namespace) -> None:
     async with _backend(options.air) as backend:
         print(f"scanning for {options.seconds:g} s …", file=sys.stderr)
         found = await find(Bracelet.services, for_s=options.seconds, backend=backend)
-    print(f"{'address':<20} {'name':<12} {'signal':>8}")
+    say(f"{'address':<20} {'name':<12} {'signal':>8}")
     for sighting in found:
-        print(f"{sighting.address:<20} {sighting.name or '–':<12} {sighting.rssi_dbm:>4} dBm")
+        say(f"{sighting.address:<20} {sighting.name or '–':<12} {sighting.rssi_dbm:>4} dBm")
     if not found:
         print("none found: is the bracelet on, near and not connected elsewhere?", file=sys.stderr)
 
@@ -129,105 +138,12 @@ async def _sim(options: argparse.Namespace) -> None:
     """Put a bracelet on a virtual air, for `steplink serve --air` in another terminal."""
     from device_sim.air_tcp import hosted_air  # noqa: PLC0415
 
-    bracelet = _bracelet(options)
-    async with hosted_air(options.air) as air, _on_air(air, bracelet, options) as played:
-        print(f"bracelet {bracelet.device_id} is on the air at {options.air}; in another terminal:", flush=True)
-        print(f"    steplink serve --air {options.air}", flush=True)
+    bracelet = _bracelet(options, options.id)
+    async with hosted_air(options.air) as air, _on_air(air, bracelet, options.name, options) as played:
+        say(f"bracelet {bracelet.device_id} is on the air at {options.air}; in another terminal:")
+        say(f"    steplink serve --air {options.air}")
         await played.until_played()
-        print("the recording has been played")
-
-
-async def _evaluate(options: argparse.Namespace) -> int:
-    """Count recordings and compare with their true steps."""
-    from service.evaluation import choices, json_file  # noqa: PLC0415
-    from service.evaluation.progress import ProgressBar  # noqa: PLC0415
-    from service.evaluation.run import evaluate  # noqa: PLC0415
-    from service.evaluation.tables import report  # noqa: PLC0415
-
-    if options.paper is not None:
-        await _evaluate_paper(options)
-        return 0
-    names, paths = choices.counters_and_paths(options.counter, options.path)
-    chosen = choices.choices(names, options.preset or "tuned", options.param)
-    found, passed = choices.find(paths, _mapping(options))
-    output, folder = json_file.checked_path(options.json), _figures_folder(options)
-    if passed:
-        print(f"steplink: passed over texts without acceleration: {', '.join(passed)}", file=sys.stderr)
-    with ProgressBar() as progress:
-        rows = await evaluate(found, chosen, jobs=options.jobs, lsb_per_g=options.lsb_per_g, progress=progress)
-    print(report(rows))
-    json_file.write_json(output, (row.as_json() for row in rows))
-    await _draw(folder, rows, found, options)
-    return NOTHING_COUNTED if all(row.error for row in rows) else 0
-
-
-async def _evaluate_paper(options: argparse.Namespace) -> None:
-    """Print a paper's tables, its figures beside ours."""
-    from service.evaluation import json_file  # noqa: PLC0415
-    from service.evaluation.papers import run  # noqa: PLC0415
-    from service.evaluation.progress import ProgressBar  # noqa: PLC0415
-
-    asked = run.asked(options.paper, options.counter, options.param)
-    found = run.recordings(options.path)
-    output, folder = json_file.checked_path(options.json), _figures_folder(options)
-    with ProgressBar() as progress:
-        made = await run.report(
-            asked,
-            found,
-            options.preset or run.PRESET,
-            jobs=options.jobs,
-            lsb_per_g=options.lsb_per_g,
-            progress=progress,
-        )
-    print(made.text())
-    json_file.write_json(output, made.as_json())
-    await _draw(folder, made.rows, found, options)
-
-
-def _figures_folder(options: argparse.Namespace) -> Path | None:
-    from service.evaluation.figures.canvas import checked_folder  # noqa: PLC0415
-
-    return None if options.figures is None else checked_folder(options.figures)
-
-
-async def _draw(folder: Path | None, rows: Sequence[Row], found: Sequence[Found], options: argparse.Namespace) -> None:
-    """Draw the figures where a folder for them was named."""
-    if folder is None:
-        return
-    from service.evaluation.figures.draw import write  # noqa: PLC0415
-
-    written = await asyncio.to_thread(write, folder, rows, found, lsb_per_g=options.lsb_per_g)
-    print(f"steplink: {len(written)} figures in {folder}: {', '.join(path.stem for path in written)}", file=sys.stderr)
-
-
-async def _bench(options: argparse.Namespace) -> None:
-    """Measure the counters' speed."""
-    from service.evaluation import bench, choices, json_file  # noqa: PLC0415
-    from service.signals.compiled import available  # noqa: PLC0415
-
-    names = [choice.counter for choice in choices.choices(options.counter or ["all"], "tuned", ())]
-    output = json_file.checked_path(options.json)
-    if not available():
-        print(bench.WITHOUT_NUMBA, file=sys.stderr)
-    figures = []
-    for figure in bench.figures(names, options.samples):
-        print(f"{figure.name:<58}{figure.value:>15,.4g} {figure.unit}", flush=True)
-        figures.append(dataclasses.asdict(figure))
-        await asyncio.sleep(0)  # Ctrl-C is heeded here
-    json_file.write_json(output, figures)
-
-
-async def _counters(options: argparse.Namespace) -> None:
-    """Print the counters, or the parameters of one."""
-    from service.counters import describe  # noqa: PLC0415
-    from service.evaluation.tables import aligned  # noqa: PLC0415
-
-    if options.markdown:
-        print(describe.markdown(), end="")
-    elif options.name is None:
-        print(aligned([describe.OVERVIEW, *describe.overview()], left=4))
-    else:
-        print(aligned([describe.PARAMETERS, *describe.parameters(options.name)], left=6))
+        say("the recording has been played")
 
 
 async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
@@ -238,7 +154,7 @@ async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
     url = address(bound)
 
     def ready() -> None:
-        print(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)", flush=True)
+        say(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)")
 
     await serve(create_app(supervisor), bound, on_ready=ready)
 
@@ -272,43 +188,56 @@ async def _backend(air: str | None) -> Any:  # noqa: ANN401
         yield Backend(scanner=central.scanner, client=central.client)
 
 
-def _on_air(air: Any, bracelet: Any, options: argparse.Namespace) -> GattBracelet:  # noqa: ANN401
+def _on_air(air: Any, bracelet: Bracelet, name: str, options: argparse.Namespace) -> GattBracelet:  # noqa: ANN401
     from device_sim.gatt import Start  # noqa: PLC0415
 
     start = Start.ON_SUBSCRIBE if options.recording or options.once else Start.POWER_ON
-    device: GattBracelet = air.bracelet(bracelet, name=options.name, speed=options.speed, start=start)
+    device: GattBracelet = air.bracelet(bracelet, name=name, speed=options.speed, start=start)
     return device
 
 
-def _bracelet(options: argparse.Namespace) -> Any:  # noqa: ANN401
+def _bracelets(options: argparse.Namespace) -> dict[str, Bracelet]:
+    """Return what is worn, by advertised name: one bracelet, or one on each wrist of the same walker."""
+    if options.wrists == 1:
+        return {options.name: _bracelet(options, options.id)}
+    if options.recording is not None:
+        raise ParameterError("wrists", options.wrists, "a recording is of one wrist: leave --recording out")
+    if (options.name, options.id) != (cli_options.DEFAULT_NAME, cli_options.DEFAULT_ID):
+        raise ParameterError("wrists", options.wrists, "two bracelets have names and ids of their own")
+    wrists = cli_options.WRISTS.items()
+    return {name: _bracelet(options, device, mirrored=place > 0) for place, (device, name) in enumerate(wrists)}
+
+
+def _bracelet(options: argparse.Namespace, device: str, *, mirrored: bool = False) -> Bracelet:
     import time  # noqa: PLC0415
 
     from device_sim.bracelet import Bracelet  # noqa: PLC0415
 
     # Boots count upwards for ever; a simulated bracelet keeps no flash memory, so the clock counts for it.
     return Bracelet(
-        _source(options),
-        device_id=options.id,
+        _source(options, mirrored=mirrored),
+        device_id=device,
         boot=time.time_ns() // BOOT_NS & 0xFFFFFFFF,
         packet_samples=options.packet_samples,
     )
 
 
-def _source(options: argparse.Namespace) -> Source:
+def _source(options: argparse.Namespace, *, mirrored: bool) -> Source:
     from device_sim.source import RecordingSource, WalkerSource  # noqa: PLC0415
+    from service.samples import Sensor  # noqa: PLC0415
 
+    sensors = tuple(Sensor)[: cli_options.SENSORS[options.sensors]]
     if options.recording is None:
-        return WalkerSource(options.walk, seed=options.seed, loop=not options.once)
+        return WalkerSource(options.walk, seed=options.seed, loop=not options.once, sensors=sensors, mirrored=mirrored)
     from service.recordings import read  # noqa: PLC0415
 
-    recording = read(options.recording, lsb_per_g=options.lsb_per_g, mapping=_mapping(options))
-    return RecordingSource(recording, loop=not options.once)
-
-
-def _mapping(options: argparse.Namespace) -> ColumnMapping | None:
-    from service.recordings import column_mapping  # noqa: PLC0415
-
-    return None if options.columns is None else column_mapping(options.columns, options.units, options.time_unit)
+    recording = read(
+        options.recording, lsb_per_g=options.lsb_per_g, mapping=cli_options.mapping(options), rate_hz=options.rate_hz
+    )
+    source = RecordingSource(recording, loop=not options.once, sensors=sensors)
+    if absent := [sensor for sensor in sensors if sensor not in source.sensors]:
+        print(f"steplink: {options.recording} holds nothing of a {' or '.join(absent)}", file=sys.stderr)
+    return source
 
 
 def _settings(options: argparse.Namespace) -> Settings:
@@ -319,10 +248,13 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="steplink", description="Live step counts of Bluetooth LE wearables.")
     parser.add_argument("--version", action="version", version=f"steplink {version('steplink')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    demo = _command(commands, "demo", _demo, "see it work: a simulated bracelet, its radio and the service in one")
+    demo = _command(
+        commands, "demo", _demo, "see it work: a simulated bracelet, its radio and the service in one", endless=True
+    )
     cli_options.add_settings(demo)
     cli_options.add_bracelet(demo)
-    serve = _command(commands, "serve", _serve, "run the service")
+    cli_options.add_wrists(demo)
+    serve = _command(commands, "serve", _serve, "run the service", endless=True)
     cli_options.add_settings(serve)
     cli_options.add_air(serve)
     serve.add_argument(
@@ -332,12 +264,14 @@ def _parser() -> argparse.ArgumentParser:
         help="connect to the device of this name or address only, and again after each loss; may be repeated"
         " (default: every bracelet heard)",
     )
-    scan = _command(commands, "scan", _scan, "list the bracelets that are near")
+    scan = _command(commands, "scan", _scan, "list the bracelets that are near", endless=True)
     scan.add_argument(
         "--seconds", type=cli_options.number(0.1, 600), default=5.0, help="how long to listen, 0.1–600 s (default 5)"
     )
     cli_options.add_air(scan)
-    sim = _command(commands, "sim", _sim, "run a simulated bracelet for `serve --air` in another terminal")
+    sim = _command(
+        commands, "sim", _sim, "run a simulated bracelet for `serve --air` in another terminal", endless=True
+    )
     sim.add_argument(
         "--air",
         metavar="HOST:PORT",
@@ -345,19 +279,29 @@ def _parser() -> argparse.ArgumentParser:
         help=f"where its radio is (default {cli_options.DEFAULT_AIR})",
     )
     cli_options.add_bracelet(sim)
-    evaluate = _command(commands, "evaluate", _evaluate, "count recordings and compare with their true steps")
+    evaluate = _command(
+        commands, "evaluate", cli_evaluation.evaluate, "count recordings and compare with their true steps"
+    )
     cli_options.add_evaluation(evaluate)
-    bench = _command(commands, "bench", _bench, "measure how fast the counters are")
+    bench = _command(commands, "bench", cli_evaluation.bench, "measure how fast the counters are")
     cli_options.add_bench(bench)
-    counters = _command(commands, "counters", _counters, "list the counters, or the parameters of one")
+    counters = _command(commands, "counters", cli_evaluation.counters, "list the counters, or the parameters of one")
     counters.add_argument("name", metavar="NAME", nargs="?", help="a counter, whose parameters are then listed")
     counters.add_argument("--markdown", action="store_true", help="print all tables as the guide has them")
     return parser
 
 
-def _command(commands: Any, name: str, command: Command, text: str) -> argparse.ArgumentParser:  # noqa: ANN401
+def _command(
+    commands: Any,  # noqa: ANN401
+    name: str,
+    command: Command,
+    text: str,
+    *,
+    endless: bool = False,
+) -> argparse.ArgumentParser:
+    """Add a command; an endless one goes on until it is told to end, so that Ctrl-C is no failure of it."""
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-    parser.set_defaults(command=command)
+    parser.set_defaults(command=command, endless=endless)
     return parser
 
 

@@ -7,9 +7,21 @@ import dataclasses
 import math
 import os
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from service.config import Settings
+from service.errors import ParameterError
+
+if TYPE_CHECKING:
+    from service.recordings import ColumnMapping
+
+DEFAULT_ID: Final = "sim-1"
+DEFAULT_NAME: Final = "Steplink"
+WRISTS: Final = {"sim-1": "Left", "sim-2": "Right"}
+"""Name of each of two bracelets, by its id."""
+
+SENSORS: Final = {"accelerometer": 1, "gyroscope": 2, "all": 3}
+"""How many of `service.samples.Sensor` a bracelet has, in that order."""
 
 DEFAULT_AIR: Final = "127.0.0.1:7400"
 DEMO_WALK: Final = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5"
@@ -50,10 +62,36 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--columns",
         metavar="time=T,x=X,y=Y,z=Z",
-        help="read texts as tables with these columns: names of the header, or numbers from 1; time may be missing",
+        help="read texts as tables with these columns: names of the header, or numbers from 1; time may be missing"
+        " where --rate-hz is given; gx, gy, gz (gyroscope), mx, my, mz (magnetometer, µT), steps (a 1 at each step, or"
+        " their running number) may be named too",
     )
-    parser.add_argument("--units", default="g", help="with --columns: acceleration in g, mg or m/s2 (default g)")
-    parser.add_argument("--time-unit", default="s", help="with --columns: time in s, ms, us or ns (default s)")
+    parser.add_argument("--units", metavar="UNIT", help="with --columns: acceleration in g, mg or m/s2 (default g)")
+    parser.add_argument("--time-unit", metavar="UNIT", help="with --columns: time in s, ms, us or ns (default s)")
+    parser.add_argument(
+        "--gyro-units", metavar="UNIT", help="with --columns: gyroscope in rad/s or deg/s (default rad/s)"
+    )
+    parser.add_argument(
+        "--rate-hz",
+        type=number(0.01, 10_000),
+        metavar="HZ",
+        help="samples a second, for files that hold neither time nor rate, 0.01–10000 Hz",
+    )
+
+
+def mapping(options: argparse.Namespace) -> ColumnMapping | None:
+    """Return which columns texts have, None where the options do not say; ParameterError for units of none."""
+    from service.recordings import column_mapping  # noqa: PLC0415
+
+    units = {"units": options.units, "time-unit": options.time_unit, "gyro-units": options.gyro_units}
+    given = {name: value for name, value in units.items() if value is not None}
+    if options.columns is not None:
+        return column_mapping(options.columns, options.units, options.time_unit, options.gyro_units)
+    for name, value in given.items():
+        raise ParameterError(
+            name, value, "it is the unit of named columns: --columns time=t,x=ax,y=ay,z=az is wanted too"
+        )
+    return None
 
 
 def add_bracelet(parser: argparse.ArgumentParser) -> None:
@@ -74,13 +112,32 @@ def add_bracelet(parser: argparse.ArgumentParser) -> None:
         "--speed", type=number(0.01, math.inf), default=1.0, help="device seconds per second (default 1)"
     )
     parser.add_argument("--once", action="store_true", help="play once instead of for ever")
-    parser.add_argument("--name", default="Steplink", help="advertised name, at most 8 bytes (default Steplink)")
-    parser.add_argument("--id", default="sim-1", help="the bracelet's own id, 1–20 bytes (default sim-1)")
+    parser.add_argument("--name", default=DEFAULT_NAME, help="advertised name, at most 8 bytes (default Steplink)")
+    parser.add_argument("--id", default=DEFAULT_ID, help="the bracelet's own id, 1–20 bytes (default sim-1)")
+    parser.add_argument(
+        "--sensors",
+        choices=tuple(SENSORS),
+        default="accelerometer",
+        help="what it measures: acceleration only, angular rate too, or all, the Earth's field with them; of a"
+        " recording, what that has of them (default accelerometer)",
+    )
     parser.add_argument(
         "--packet-samples",
         type=int,
-        default=10,
-        help="most samples of one packet; 0 fills the MTU, 10 at 50 Hz are 0.2 s (default 10)",
+        default=8,
+        help="most samples of one packet; 0 fills the MTU, 8 at 50 Hz are 0.16 s (default 8)",
+    )
+
+
+def add_wrists(parser: argparse.ArgumentParser) -> None:
+    """Add on how many wrists a walker wears a bracelet."""
+    parser.add_argument(
+        "--wrists",
+        type=int,
+        choices=(1, 2),
+        default=1,
+        help="bracelets on one synthetic walker's wrists; two are sim-1 Left and sim-2 Right, the same true steps"
+        " (default 1)",
     )
 
 
@@ -110,6 +167,12 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME.KEY=V",
         help="change one parameter of one counter, as in double_threshold.bout=3; may be repeated",
+    )
+    parser.add_argument(
+        "--calibrate",
+        metavar="WALK",
+        help="let counters learn before they count: `middle`, each recording from its own middle 300 samples"
+        " (double_threshold), or a file, a calibration walk (double_threshold, gyro_zero_crossing: as slow as ever)",
     )
     _add_json(parser, "write a row for each recording and counter there")
     parser.add_argument(

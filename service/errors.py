@@ -1,14 +1,17 @@
 """Every error steplink raises on purpose; the tree is this page.
 
     SteplinkError
-    ├── ParameterError      a counter's or command's parameter is unknown, of the wrong type or out of range
+    ├── ParameterError      a counter's or command's parameter is unknown, wrong, out of range or against another
     ├── RecordingError      a file is no recording: wrong shape, missing columns, NaN, an unknown format
     ├── WireError           bytes from a device that are no valid packet; `reason` says which rule they break
     ├── SnapshotError       a snapshot of another counter, version or parameters
     ├── CounterError        a counter cannot be built: unknown name, or a sensor the device lacks
     ├── LinkError           a link could not be made or was lost; `reason` is a LinkFault
     ├── StoreError          something could not be stored or read; `reason` is a StoreFault
-    └── UnknownDeviceError  no device of that id
+    ├── LearningError       a walk from which a counter's parameters cannot be learnt
+    ├── NotNowError         what was asked for is possible, but not at this moment
+    ├── UnknownDeviceError  no device of that id
+    └── UnknownNumberError  no calibration or trial of that number
 
 Each carries typed fields and a sentence that says what to do. None of them ends a stream: bad input is counted
 and skipped, a lost link is made again.
@@ -24,7 +27,7 @@ class SteplinkError(Exception):
 
 
 class ParameterError(SteplinkError):
-    """A parameter is unknown, of the wrong type or out of range."""
+    """A parameter is unknown, of the wrong type, out of range or in contradiction to another."""
 
     def __init__(self, name: str, value: object, why: str) -> None:
         super().__init__(f"{name} = {value!r}: {why}")
@@ -124,9 +127,26 @@ class StoreError(SteplinkError):
         return self.reason in PASSING_FAULTS
 
 
+class LearningError(SteplinkError):
+    """A walk from which a counter's parameters cannot be learnt; it says how to walk."""
+
+
+class NotNowError(SteplinkError):
+    """What was asked for is possible, but not at this moment; it says when."""
+
+
 class UnknownDeviceError(SteplinkError):
     """No device of that id."""
 
     def __init__(self, device: str) -> None:
         super().__init__(f"no device {device!r}: GET /api/v1/devices lists the known ones")
         self.device = device
+
+
+class UnknownNumberError(SteplinkError):
+    """No calibration or trial of that number."""
+
+    def __init__(self, what: str, number: int, where: str) -> None:
+        super().__init__(f"no {what} {number}: GET {where} lists them")
+        self.what = what
+        self.number = number

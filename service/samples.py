@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,25 @@ TICK_HZ = 1024
 TICK_EVERY = 128
 """A tick is taken at every sample whose index is a multiple of this, so that time does not depend on packet size."""
 
+MIN_RATE_HZ = 10.0
+"""A run has up to 4 steps a second, and its second harmonic tells the feet apart: less is no signal to count."""
+
 Column = Sequence[float] | NDArray[np.float64]
 Columns = tuple[Column, Column, Column]
+
+
+class Sensor(StrEnum):
+    """What a device can measure."""
+
+    ACCELEROMETER = "accelerometer"
+    GYROSCOPE = "gyroscope"
+    MAGNETOMETER = "magnetometer"
+
+
+Sensors = tuple[Sensor, ...]
+"""Sensors of a device or of its samples, in the order of the enumeration; every device has the first."""
+
+ACCELEROMETER_ONLY: Sensors = (Sensor.ACCELEROMETER,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,9 +61,23 @@ class RawBlock:
     acc_g: Columns
     gyro_rad_s: Columns | None = None
     mag_ut: Columns | None = None
+    saturated: Sequence[int] = ()
+    """Which samples, counted from the block's first, hold a value at its limit: the true one is unknown."""
 
     def __len__(self) -> int:
         return len(self.acc_g[0])
+
+    @property
+    def sensors(self) -> Sensors:
+        """What every sample of the block holds."""
+        return _HELD[self.gyro_rad_s is not None, self.mag_ut is not None]
+
+
+_HELD = {
+    (gyro, mag): tuple(sensor for sensor, held in zip(Sensor, (True, gyro, mag), strict=True) if held)
+    for gyro in (False, True)
+    for mag in (False, True)
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +96,7 @@ class SampleBlock:
         return len(self.acc_g[0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class Step(NamedTuple):
     """One counted step.
 
     `at_s` is device time after boot, the filter's delay removed. `interval_s` is the time since the previous step of
@@ -82,8 +113,7 @@ class Step:
     lower: float | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Band:
+class Band(NamedTuple):
     """Both thresholds in force over a window of device time, for the plot."""
 
     from_s: float
@@ -92,19 +122,22 @@ class Band:
     lower: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Update:
+Likely = tuple[float, float, bool]
+"""A step that may come: device time, strength, whether it passes what is in force. Confirmed, it has the same time."""
+
+
+class Update(NamedTuple):
     """What a counter says after a block: steps now certain, how many more are likely, and its view for the plot.
 
-    `likely` names the pending steps where the counter can tell them apart; those it names no more and has not confirmed
-    are retracted. `trace` holds the filtered signal, one value a sample of the block, the first at device time
-    `trace_from_s`.
+    `likely` names every peak that can still become a step, where the counter can tell them apart; one it names no more
+    and has not confirmed is retracted. `pending` counts those of them that pass what is in force. `trace` holds the
+    filtered signal, one value a sample of the block, the first at device time `trace_from_s`. A tuple, since one is
+    made a packet and counter, and a frozen dataclass takes twice as long to make.
     """
 
     steps: tuple[Step, ...] = ()
     pending: int = 0
-    likely: Sequence[tuple[float, float]] = ()
-    """(device time, strength) of each; a step confirmed later has the same `at_s`."""
+    likely: Sequence[Likely] = ()
     trace_from_s: float = 0.0
     trace: Sequence[float] = ()
     bands: tuple[Band, ...] = ()
@@ -136,14 +169,19 @@ class DeviceInfo:
     manufacturer: str | None = None
     model: str | None = None
     firmware: str | None = None
+    sensors: Sensors | None = None
 
 
-class Sensor(StrEnum):
-    """What a device can measure."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heading:
+    """The direction somebody walks in, degrees clockwise from magnetic north, and its standard uncertainty.
 
-    ACCELEROMETER = "accelerometer"
-    GYROSCOPE = "gyroscope"
-    MAGNETOMETER = "magnetometer"
+    Where `is_line`, that or the opposite one: `deg` is in [0, 180).
+    """
+
+    deg: float
+    uncertainty_deg: float
+    is_line: bool
 
 
 # What a Tracker emits. A session adds the device's id, an ordinal to the durable ones, and UTC.
@@ -151,26 +189,35 @@ class Sensor(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepCounted:
-    """Durable: one confirmed step; `steps` is this counter's count with it, `boot` the boot its time belongs to."""
+    """Durable: one confirmed step; `steps` is this counter's count with it, `boot` the boot its time belongs to.
+
+    Its time is known to `uncertainty_s`. `heading` is None where the sensors give none.
+    """
 
     counter: str
     boot: int
     steps: int
     step: Step
+    uncertainty_s: float = 0.5 / GRID_HZ
+    heading: Heading | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tentative:
     """Neither kept nor numbered: the primary's step at `at_s` is likely, or is `retracted`; a StepCounted confirms it.
 
-    `interval_s` is the time since the likely or confirmed step before, None after a pause.
+    `passes` tells whether it passes what was in force when it was told: the sure ones. `interval_s` is the time since
+    the confirmed step or the sure one before, None after a pause. Time and heading as in StepCounted.
     """
 
     boot: int
     at_s: float
     strength: float
     interval_s: float | None
+    passes: bool
     retracted: bool
+    uncertainty_s: float = 0.5 / GRID_HZ
+    heading: Heading | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,4 +273,11 @@ class Counting:
     cadence_spm: float | None
 
 
-Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gridded:
+    """Never published: the grid samples that the counters were given; a Gap before them has been told."""
+
+    block: SampleBlock
+
+
+Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting | Gridded

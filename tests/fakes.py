@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from service.counters.contract import Snapshot
-from service.samples import GRID_HZ, Packet, SampleBlock, Step, Update
+from service.samples import ACCELEROMETER_ONLY, GRID_HZ, Packet, SampleBlock, Step, Update
 from service.wearables import bracelet as wire
 
 EVERY = 25
@@ -14,7 +14,9 @@ class MetronomeCounter:
     """Counts a step at every 25th sample of the grid that it is given; pending while half way to the next."""
 
     name = "metronome"
+    sensors = ACCELEROMETER_ONLY
     latency_s = 0.0
+    time_error_s = 0.0
 
     def __init__(self):
         self.seen: list[tuple[int, int]] = []
@@ -38,11 +40,15 @@ class MetronomeCounter:
         self._next = state["next"]
 
 
-def described(*, device="dev-1", boot=1, lsb_per_g=4096, rate_hz=50.0, clock=(0, 0)) -> Iterator[Packet]:
-    """The values a host reads from a bracelet after connecting."""
+def described(
+    *, device="dev-1", boot=1, lsb_per_g=4096, rate_hz=50.0, clock=(0, 0), sensors=ACCELEROMETER_ONLY
+) -> Iterator[Packet]:
+    """The values a host reads from a bracelet after connecting; one with an accelerometer only has no more to say."""
+    more = {wire.SENSORS: wire.encode_sensors(sensors, lsb_per_rad_s=900, lsb_per_100_ut=6400)}
     values = {
         wire.DEVICE_ID: device.encode(),
         wire.BOOT: wire.encode_boot(boot),
+        **(more if sensors != ACCELEROMETER_ONLY else {}),
         wire.SCALE: wire.encode_scale(lsb_per_g),
         wire.RATE: wire.encode_rate(rate_hz),
         wire.CLOCK: wire.encode_clock(*clock),
@@ -56,17 +62,17 @@ def tick_at(index: int, rate_hz: float = 50.0) -> int:
     return int(wire.tick_index(index) * 1024 / rate_hz)
 
 
-def data_packet(index: int, n: int = 10, *, boot=1, rate_hz=50.0) -> Packet:
-    """n samples of a ramp: x is the sample's index modulo 1000, y 0, z 1 g."""
-    counts = [((index + i) % 1000, 0, 4096) for i in range(n)]
-    packet = wire.DataPacket(boot=boot, index=index, tick=tick_at(index, rate_hz), counts=counts)
+def data_packet(index: int, n: int = 10, *, boot=1, rate_hz=50.0, sensors=ACCELEROMETER_ONLY) -> Packet:
+    """n samples of a ramp: x of each sensor is the sample's index modulo 1000, y 0, z 4096."""
+    counts = [((index + i) % 1000, 0, 4096) * len(sensors) for i in range(n)]
+    packet = wire.DataPacket(boot=boot, index=index, tick=tick_at(index, rate_hz), counts=counts, sensors=sensors)
     at_ns = round((index + n) / rate_hz * 1e9) + 1_700_000_000_000_000_000
     return Packet(characteristic=wire.DATA, data=wire.encode(packet), at_ns=at_ns)
 
 
-def data_packets(sizes: Iterable[int], *, start=0, boot=1, rate_hz=50.0) -> Iterator[Packet]:
+def data_packets(sizes: Iterable[int], *, start=0, **how) -> Iterator[Packet]:
     """Packets of these sizes, one after the other."""
     index = start
     for n in sizes:
-        yield data_packet(index, n, boot=boot, rate_hz=rate_hz)
+        yield data_packet(index, n, **how)
         index += n

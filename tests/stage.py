@@ -43,9 +43,13 @@ class Stage:
 
     async def until(self, condition, *, within_s=10.0):
         """Wait until `condition(device)` holds; return the device."""
+        return await self.poll("devices/sim-1", condition, within_s=within_s)
+
+    async def poll(self, path, condition, *, within_s=10.0):
+        """Wait until `condition(what is at path)` holds; return it."""
         async with asyncio.timeout(within_s):
             while True:
-                answer = await self.http.get("api/v1/devices/sim-1")
+                answer = await self.http.get(f"api/v1/{path}")
                 if answer.status_code == 200 and condition(answer.json()):
                     return answer.json()
                 await asyncio.sleep(0.02)
@@ -56,13 +60,16 @@ def default_tracker(wearable):
 
 
 @contextlib.asynccontextmanager
-async def staged(bracelet, *, durable_limit=1000, wanted=None, beside=(), **radio):
-    """Run the service over a bracelet on a local air; everything is closed and joined at the end."""
-    async with LocalAir() as air, air.bracelet(bracelet, **radio) as gatt, air.central() as central:
+async def staged(bracelet, *others, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), **radio):
+    """Run the service over bracelets on a local air; everything is closed and joined at the end."""
+    async with contextlib.AsyncExitStack() as stack:
+        air = await stack.enter_async_context(LocalAir())
+        gatt, *_ = [await stack.enter_async_context(air.bracelet(worn, **radio)) for worn in (bracelet, *others)]
+        central = await stack.enter_async_context(air.central())
         supervisor = Supervisor(
             hub=Hub(durable_limit=durable_limit),
             make_wearable=Protocol,
-            lineup=lineup(DEFAULT, beside=beside),
+            lineup=lineup(counter, beside=beside),
             wanted=wanted,
             backend=Backend(scanner=central.scanner, client=central.client),
         )

@@ -92,6 +92,41 @@ def test_the_demo_counts_and_ends(sent):
     assert f"http://127.0.0.1:{port}/" in out
 
 
+def devices(port):
+    items = httpx.get(f"http://127.0.0.1:{port}/api/v1/devices", trust_env=False).json()["items"]
+    return {device["id"]: device for device in items}
+
+
+@pytest.mark.full
+def test_a_demo_on_two_wrists_counts_both_alike():
+    port = free_port()
+    words = ["--wrists", 2, "--sensors", "all", "--beside", "gyro_zero_crossing", "--walk", "normal:20", "--once"]
+    with running("demo", "--port", port, *words, "--speed", 4) as demo:
+        wait_for(lambda: len(found := devices(port)) == 2 and all(one["state"] == "lost" for one in found.values()), 30)
+        found = devices(port)
+        assert {device: one["name"] for device, one in found.items()} == {"sim-1": "Left", "sim-2": "Right"}
+        for one in found.values():
+            assert one["samples"] == 1000
+            assert one["counters"]["double_threshold"] == pytest.approx(36, abs=6)
+            assert one["counters"]["gyro_zero_crossing"] == pytest.approx(36, abs=8)
+        ends_cleanly(demo, signal.SIGINT)
+
+
+@pytest.mark.full
+def test_a_counter_without_its_sensor_is_on_the_log_and_in_the_device():
+    port = free_port()
+    with running("demo", "--port", port, "--counter", "fusion") as demo:
+        wait_for(lambda: "fusion" in (((found := first_device(port)) and found["counter_faults"]) or ()))
+        assert "needs gyroscope, magnetometer; the device has accelerometer" in ends_cleanly(demo, signal.SIGINT)
+
+
+def test_a_recording_without_the_sensor_asked_for_is_told(tmp_path):
+    path = tmp_path / "still.csv"
+    path.write_text("time_s,x_g,y_g,z_g\n" + "".join(f"{i / 50},0,0,1\n" for i in range(50)))
+    with running("sim", "--air", f"127.0.0.1:{free_port()}", "--recording", path, "--sensors", "all") as sim:
+        assert "holds nothing of a gyroscope or magnetometer" in sim.stdout.readline()
+
+
 @pytest.mark.full
 def test_a_bracelet_in_one_terminal_and_the_service_in_another():
     port, air = free_port(), f"127.0.0.1:{free_port()}"
@@ -236,6 +271,13 @@ def test_a_port_in_use_is_one_line():
         (["demo", "--walk", "normal:99999h"], "24 h"),
         (["demo", "--speed", "0"], "0.01"),
         (["demo", "--packet-samples", "-1"], "packet"),
+        (["demo", "--sensors", "thermometer"], "gyroscope"),
+        (["demo", "--counter", "autocorrelation", "--param", "autocorrelation.t_min=60"], "t_max"),
+        (["demo", "--beside", "plus_minus", "--param", "plus_minus.score_over=39"], "half"),
+        (["evaluate", ".", "--counter", "adaptive_peak", "--param", "adaptive_peak.run_g=1"], "walk_g"),
+        (["demo", "--wrists", "3"], "1, 2"),
+        (["demo", "--wrists", "2", "--id", "mine"], "names and ids of their own"),
+        (["demo", "--wrists", "2", "--recording", "walk.csv"], "one wrist"),
         (["sim", "--air", "nowhere"], "nowhere"),
         (["serve", "--air", "example.org:80"], "example.org"),
         (["scan", "--seconds", "0"], "0.1"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,12 +16,16 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import TypeAdapter
 
 from service.api import models
+from service.api.calibrations import add_calibration_routes
 from service.api.devices import add_counter_routes, add_device_routes
 from service.api.guard import Guard
+from service.api.guide import add_guide
 from service.api.live import serve_feed
+from service.api.trials import add_trial_routes
 from service.config import LOOPBACK
-from service.errors import CounterError, ParameterError, UnknownDeviceError
+from service.errors import CounterError, NotNowError, ParameterError, UnknownDeviceError, UnknownNumberError
 from service.pipeline.supervisor import Supervisor
+from service.pipeline.trials import Trials
 
 WEB = Path(__file__).parent / "web"
 DESCRIPTION = """Live step counts of Bluetooth LE wearables.
@@ -31,8 +35,8 @@ device time, seconds after the device's boot. The live feed is the WebSocket `/a
 devices): a `snapshot` first, then events; `GET /api/v1/live/schema` has the JSON Schema of every message."""
 
 
-def create_app(supervisor: Supervisor) -> FastAPI:
-    """Return the application over `supervisor`, which runs while the application does."""
+def create_app(supervisor: Supervisor, trials: Trials | None = None) -> FastAPI:
+    """Return the application over `supervisor`, which runs while the application does, and over its trials."""
 
     @contextlib.asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -52,19 +56,33 @@ def create_app(supervisor: Supervisor) -> FastAPI:
         },
         middleware=[Middleware(Guard, hosts=frozenset(LOOPBACK))],
     )
-    app.add_exception_handler(UnknownDeviceError, _not_found)
     app.add_exception_handler(RequestValidationError, _invalid)
-    for fault in (ParameterError, CounterError):
-        app.add_exception_handler(fault, _unprocessable)
+    for fault, status in _REFUSALS.items():
+        app.add_exception_handler(fault, _refusal(status))
     add_device_routes(app, supervisor)
     add_counter_routes(app, supervisor)
+    add_calibration_routes(app, supervisor)
+    add_trial_routes(app, supervisor, trials or Trials())
     _add_live(app, supervisor)
     _add_page(app)
+    add_guide(app)
     return app
 
 
-async def _not_found(_request: Request, error: Exception) -> JSONResponse:
-    return JSONResponse({"detail": str(error)}, status_code=404)
+_REFUSALS: dict[type[Exception], int] = {
+    UnknownDeviceError: 404,
+    UnknownNumberError: 404,
+    NotNowError: 409,
+    ParameterError: 422,
+    CounterError: 422,
+}
+
+
+def _refusal(status: int) -> Callable[[Request, Exception], Awaitable[JSONResponse]]:
+    async def answer(_request: Request, error: Exception) -> JSONResponse:
+        return JSONResponse({"detail": str(error)}, status_code=status)
+
+    return answer
 
 
 async def _invalid(_request: Request, error: Exception) -> JSONResponse:
@@ -72,10 +90,6 @@ async def _invalid(_request: Request, error: Exception) -> JSONResponse:
     found = error.errors() if isinstance(error, RequestValidationError) else []
     detail = "; ".join(f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}" for fault in found)
     return JSONResponse({"detail": detail}, status_code=422)
-
-
-async def _unprocessable(_request: Request, error: Exception) -> JSONResponse:
-    return JSONResponse({"detail": str(error)}, status_code=422)
 
 
 def _add_live(app: FastAPI, supervisor: Supervisor) -> None:

@@ -71,7 +71,12 @@ def add_counter_routes(app: FastAPI, supervisor: Supervisor) -> None:
 
     @app.put("/api/v1/devices/{id}/counters", tags=["counters"], responses=_UNKNOWN)
     async def put_lineup(id: str, wanted: models.LineupModel) -> models.LineupModel:  # noqa: A002
-        """Let these counters run from now on; another primary begins a new segment, and `steps` goes on."""
+        """Let these counters run from now on; another primary begins a new segment, and `steps` goes on.
+
+        Refused where the device is known to lack a sensor that the primary needs; the others wait for it, and
+        `counter_faults` of the device says so. Refused too where parameters are out of range or contradict each other;
+        a refusal changes nothing.
+        """
         device = supervisor.device(id)
         choices = [
             CounterChoice(name=choice.name, preset=choice.preset, overrides=choice.params) for choice in wanted.counters

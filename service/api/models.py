@@ -9,7 +9,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, Strict
 
 from service.pipeline.lifecycle import State
 
@@ -17,6 +17,12 @@ Item = TypeVar("Item")
 
 _DEVICE = "sim-7f3a21"
 _AT = "2026-01-02T03:04:05.678000Z"
+
+_DEVICE_UNCERTAINTY = "How far `device_s` may be off: half a sample, the device's clock, and the counter's filters"
+_AT_UNCERTAINTY = "How far `at` may be off: `device_uncertainty_s` and the spread of delays; not the link's least delay"
+_HEADING = "Direction of walking, clockwise from magnetic north; null where the sensors give none"
+_HEADING_IS_LINE = "Whether it is that direction or the opposite one: a swinging limb does not tell; then under 180"
+_HEADING_UNCERTAINTY = "Standard uncertainty of `heading_deg`"
 
 
 class Page(BaseModel, Generic[Item]):
@@ -42,7 +48,13 @@ class Device(BaseModel):
     counters: dict[str, int] = Field(
         description="Each counter's own confirmed steps since it began", examples=[{"double_threshold": 128}]
     )
-    counter_faults: dict[str, str] = Field(description="Why a counter does not count: a sensor the device lacks")
+    counter_faults: dict[str, str] = Field(
+        description="Why a counter does not count: a sensor the device lacks or does not send, or under 10 samples a"
+        " second"
+    )
+    sensors: list[str] | None = Field(
+        description="What the device says it measures; null until it has", examples=[["accelerometer", "gyroscope"]]
+    )
     cadence_spm: float | None = Field(description="Steps a minute; null while nobody walks", examples=[108.4])
     battery_percent: int | None = Field(examples=[87])
     rate_hz: float | None = Field(description="Nominal sampling rate", examples=[50.0])
@@ -53,6 +65,7 @@ class Device(BaseModel):
     packets_duplicate: int = Field(description="Packets that held nothing new; skipped")
     samples: int
     samples_lost: int = Field(description="Samples that did not arrive")
+    samples_saturated: int = Field(description="Samples with a value at its limit, counted: the true one is unknown")
     gaps: int
     reboots: int
     manufacturer: str | None
@@ -79,8 +92,13 @@ class StepEvent(_Durable):
     boot: int
     counter: str = Field(examples=["double_threshold"])
     steps: int = Field(description="This counter's count with this step", examples=[37])
+    device_uncertainty_s: float = Field(description=_DEVICE_UNCERTAINTY, examples=[0.01])
+    at_uncertainty_s: float = Field(description=_AT_UNCERTAINTY, examples=[0.02])
     strength: float = Field(examples=[0.61])
     interval_s: float | None = Field(description="Time since the step before; null for the first", examples=[0.54])
+    heading_deg: float | None = Field(description=_HEADING, examples=[47.0])
+    heading_uncertainty_deg: float | None = Field(description=_HEADING_UNCERTAINTY, examples=[24.0])
+    heading_is_line: bool | None = Field(description=_HEADING_IS_LINE)
     peak: float | None = Field(examples=[1.32])
     valley: float | None = Field(examples=[0.71])
     upper: float | None = Field(examples=[1.02])
@@ -90,16 +108,24 @@ class StepEvent(_Durable):
 class TentativeEvent(_Event):
     """A step of the primary counter that is likely, some 0.2 s after it happened; or that it has taken back.
 
-    The `step` event with the same `device_s` and `boot` confirms it. It has no ordinal and no log keeps it.
+    Every step is told so before it is confirmed by the `step` event with the same `device_s` and `boot`; what is not
+    confirmed is retracted. It has no ordinal and no log keeps it. See the guide, `navigation`.
     """
 
     type: Literal["tentative"] = "tentative"
     status: Literal["likely", "retracted"]
-    device_s: float = Field(description="Device time of the step, good to half a sample (0.01 s)", examples=[21.34])
+    passes: bool = Field(description="Passes the thresholds in force when it was told: nine in ten of these are steps")
+    device_s: float = Field(description="Device time of the step", examples=[21.34])
     boot: int
-    at_uncertainty_s: float = Field(description="How well `at` is known, besides the link's least delay")
+    device_uncertainty_s: float = Field(description=_DEVICE_UNCERTAINTY, examples=[0.01])
+    at_uncertainty_s: float = Field(description=_AT_UNCERTAINTY, examples=[0.02])
     strength: float = Field(description="Height above the valleys, in the counter's unit", examples=[0.6])
-    interval_s: float | None = Field(description="Time since the step before; null after a pause", examples=[0.54])
+    interval_s: float | None = Field(
+        description="Time since the last confirmed step or likely one that passes; null after a pause", examples=[0.54]
+    )
+    heading_deg: float | None = Field(description=_HEADING, examples=[47.0])
+    heading_uncertainty_deg: float | None = Field(description=_HEADING_UNCERTAINTY, examples=[24.0])
+    heading_is_line: bool | None = Field(description=_HEADING_IS_LINE)
 
 
 class StateEvent(_Durable):
@@ -223,6 +249,9 @@ class CounterModel(BaseModel):
 
     name: str = Field(examples=["double_threshold"])
     sensors: list[str] = Field(examples=[["accelerometer"]])
+    calibrations: list[str] = Field(
+        description="Ways to learn parameters of it from a walk on a device", examples=[["walk", "middle"]]
+    )
     parameters: list[ParameterModel]
 
 
@@ -233,7 +262,7 @@ class ChoiceModel(BaseModel):
 
     name: str = Field(examples=["double_threshold"])
     preset: str = Field(default="tuned", description="paper or tuned")
-    params: dict[str, float | str] = Field(default_factory=dict, examples=[{"rest_raw": 4.0}])
+    params: dict[str, Annotated[float, Strict()] | str] = Field(default_factory=dict, examples=[{"rest_raw": 4.0}])
 
 
 class LineupModel(BaseModel):

@@ -42,6 +42,7 @@ def device_view(device: Device) -> models.Device:
         steps_now=tracker.steps_now,
         counters=tracker.steps,
         counter_faults=tracker.counter_faults,
+        sensors=None if info.sensors is None else list(info.sensors),
         cadence_spm=tracker.cadence_spm if device.state is State.STREAMING else None,
         battery_percent=info.battery_percent,
         rate_hz=info.rate_hz,
@@ -52,6 +53,7 @@ def device_view(device: Device) -> models.Device:
         packets_duplicate=tally.packets_duplicate,
         samples=tally.samples,
         samples_lost=tally.samples_lost,
+        samples_saturated=tally.samples_saturated,
         gaps=tally.gaps,
         reboots=tally.reboots,
         manufacturer=info.manufacturer,
@@ -112,6 +114,7 @@ def step_view(notice: Notice) -> models.StepEvent:
         boot=event.boot,
         counter=event.counter,
         steps=event.steps,
+        **_known(notice, event),
         strength=step.strength,
         interval_s=step.interval_s,
         peak=step.peak,
@@ -124,7 +127,9 @@ def step_view(notice: Notice) -> models.StepEvent:
 def counter_view(kind: CounterKind) -> models.CounterModel:
     """Return a counter of the registry with its parameters."""
     parameters = [_parameter_view(field, kind) for field in dataclasses.fields(kind.params)]
-    return models.CounterModel(name=kind.name, sensors=sorted(kind.sensors), parameters=parameters)
+    return models.CounterModel(
+        name=kind.name, sensors=sorted(kind.sensors), calibrations=list(kind.calibrations), parameters=parameters
+    )
 
 
 def _parameter_view(field: dataclasses.Field[Any], kind: CounterKind) -> models.ParameterModel:
@@ -156,12 +161,25 @@ def _tentative_view(notice: Notice, event: Tentative) -> models.TentativeEvent:
         device=notice.device,
         at=utc(notice.at_ns),
         status="retracted" if event.retracted else "likely",
+        passes=event.passes,
         device_s=event.at_s,
         boot=event.boot,
-        at_uncertainty_s=round(notice.uncertainty_s, 6),
+        **_known(notice, event),
         strength=event.strength,
         interval_s=event.interval_s,
     )
+
+
+def _known(notice: Notice, event: StepCounted | Tentative) -> dict[str, Any]:
+    """Return how well a step's times are known, and its heading."""
+    heading = event.heading
+    return {
+        "device_uncertainty_s": round(event.uncertainty_s, 6),
+        "at_uncertainty_s": round(notice.uncertainty_s + event.uncertainty_s, 6),
+        "heading_deg": round(heading.deg, 1) if heading else None,
+        "heading_uncertainty_deg": round(heading.uncertainty_deg, 1) if heading else None,
+        "heading_is_line": heading.is_line if heading else None,
+    }
 
 
 def _ephemeral_view(notice: Notice, event: Signal | Counting) -> models.SignalEvent | models.CountingEvent:

@@ -48,9 +48,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from service.counters.contract import choice, parameter
+from service.counters.contract import choice, ordered, parameter
 from service.counters.streaming import KernelCounter
-from service.counters.windowed_peak import Gait, Rules, counter
+from service.counters.windowed_peak import Gait, Rules, check_spacing, counter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +69,12 @@ class AdaptivePeakParams:
     run_longest_s: float = parameter(0.5, unit="s", low=0.3, high=3, text="most time between steps, running")
     bout: int = parameter(2, unit="peaks", low=1, high=12, text="peaks that make a bout certain")
     credit: str = choice("never", options=("never", "retrospective"), text="whether the peaks before that count")
+
+    def __post_init__(self) -> None:
+        """Check that both gaits can be; ParameterError names what contradicts what."""
+        ordered(self, "walk_g", "run_g")
+        check_spacing(self, "walk_")
+        check_spacing(self, "run_")
 
 
 PAPER: Final = AdaptivePeakParams()

@@ -13,6 +13,8 @@ from collections.abc import MutableSequence, Sequence
 from math import sqrt
 from typing import Final
 
+from service.samples import Likely
+
 # Constants of an instance.
 N: Final = 0  # steps a period: 1, or 2 where it is a stride
 T_MIN: Final = 1
@@ -57,6 +59,9 @@ STILL: Final = 1e-12
 
 NEAREST: Final = 0.6
 """Steps lie at least this share of a step's time apart: the slopes of a slow arm swing repeat, its crests do not."""
+
+SEARCHED: Final = 2.75
+"""Longest periods back that a period found off the rhythm counts steps, with the one credited with it."""
 
 EQUAL: Final = 1e-9
 """Correlations closer than this are equal: a perfectly even walk repeats after two steps as after one."""
@@ -105,35 +110,64 @@ def stop(s: State) -> None:
     s[BOUT_STEPS] = s[PERIOD] = s[RHYTHM] = 0.0
 
 
-def pending(s: State) -> int:
-    """Return how many steps are likely."""
-    return len(likely(s))
+def likely(s: State) -> list[Likely]:
+    """Return crests that can become steps: index, height, and whether the rhythm has them all but certain.
 
-
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return index and strength of the steps of a bout not certain yet, and of the period's crests that have passed."""
-    found: list[tuple[float, float]] = []
-    if s[CREDIT] > 0.0 and s[BOUT_STEPS] < s[BOUT] and s[NEXT] - 1.0 - s[LAST] <= s[PATIENCE]:
-        last = HELD + int(s[BOUT_STEPS]) * ROW
-        found += [(s[held], s[held + 2] - s[held + 3]) for held in range(HELD, last, ROW)]
-    if s[RHYTHM] > 0.0 and (s[CREDIT] > 0.0 or s[BOUT_STEPS] + 1.0 >= s[BOUT]):
-        found += _expected(s)
+    Those are the steps of a bout that can still become certain, the tops that a period could take, and, while one is
+    locked, the highest samples so far of its parts.
+    """
+    credit = s[CREDIT] > 0.0
+    found: list[Likely] = []
+    if credit or s[BOUT_STEPS] + s[N] >= s[BOUT]:
+        found = _tops(s)
+        if s[RHYTHM] > 0.0:
+            expected = _expected(s)
+            named = {one[0] for one in expected}
+            found = sorted([one for one in found if one[0] not in named] + expected)
+    first = found[0][0] if found else s[NEXT] - 1.0
+    if credit and s[BOUT_STEPS] < s[BOUT] and min(first, s[NEXT] - 1.0) - s[LAST] <= s[PATIENCE]:
+        end = HELD + int(s[BOUT_STEPS]) * ROW
+        return [(s[held], s[held + 2] - s[held + 3], True) for held in range(HELD, end, ROW)] + found
     return found
 
 
-def _expected(s: State) -> list[tuple[float, float]]:
-    """Return index and strength of the crests that `_steps` will find if the period under way is walking."""
+def _expected(s: State) -> list[Likely]:
+    """Return the highest samples that `_steps` will find if the period under way is walking, as far as it has come."""
     k, steps, t, length = int(s[NEXT]) - 1, int(s[N]), int(s[PERIOD]), int(s[LENGTH])
     newest = RING + length + (int(s[PLACE]) - 1) % length
     half = t // (2 * steps)
     reach = half // 2
-    found: list[tuple[float, float]] = []
+    found: list[Likely] = []
     for j in range(steps - 1, -1, -1):
         centre = int(s[DUE]) - half - j * t // steps
-        if centre + reach <= k:
-            at = _highest(s, k, newest, centre - reach, centre + reach)
+        whole = centre + reach <= k
+        if centre - reach >= k:
+            break
+        at = _highest(s, k, newest, centre - reach, centre + reach if whole else k)
+        if whole or at < k:
             low = _lowest(s, k, newest, max(at - half, int(s[FIRST])), min(at + half, k))
-            found.append((float(at), s[newest - k + at] - low))
+            found.append((float(at), s[newest - k + at] - low, whole))
+    return found
+
+
+def _tops(s: State) -> list[Likely]:
+    """Return the samples that rise above all near them, as far back as a period that is found now would count them."""
+    k, length, steps = int(s[NEXT]) - 1, int(s[LENGTH]), int(s[N])
+    near = int(s[T_MIN]) // (4 * steps)
+    span = min(int(SEARCHED * s[T_MAX]), k - int(s[FIRST]) + 1)
+    newest = RING + length + (int(s[PLACE]) - 1) % length
+    seen = s[newest - span + 1 : newest + 1]
+    least = sqrt(s[IDLE])
+    if span <= near or max(seen) - min(seen) < least:
+        return []
+    found: list[Likely] = []
+    from_ = max(near, int(s[LAST] + NEAREST * s[T_MIN] / steps) - k + span) if s[BOUT_STEPS] > 0.0 else near
+    for i in range(from_, span - 1):
+        v = seen[i]
+        if v > seen[i - 1] and v >= seen[i + 1] and v == max(seen[i - near : i + near + 1]):
+            low = min(seen[max(i - 2 * near, 0) : i + 2 * near + 1])
+            if v - low >= least:
+                found.append((float(k - span + 1 + i), v - low, False))
     return found
 
 

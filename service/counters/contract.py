@@ -12,26 +12,34 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Protocol, TypeVar
 
 from service.errors import ParameterError, SnapshotError
-from service.samples import SampleBlock, Update
+from service.samples import SampleBlock, Sensor, Update
 
 Snapshot = dict[str, Any]
 """Plain data (JSON-able): the counter's name, version, a hash of its parameters and its state."""
 
 
 class StepCounter(Protocol):
-    """A streaming step counter; `name`, `version` and `latency_s` are constants of an instance."""
+    """A streaming step counter; `name`, `sensors`, `version` and `latency_s` are constants of an instance."""
 
     @property
     def name(self) -> str:
         """The registry's name of the algorithm."""
 
     @property
+    def sensors(self) -> Collection[Sensor]:
+        """What a block must hold."""
+
+    @property
     def latency_s(self) -> float:
         """The longest time from a step to its confirmation, in seconds of device time."""
+
+    @property
+    def time_error_s(self) -> float:
+        """How far a step's time may be off besides half a sample: by what its filters delay one motion or another."""
 
     def update(self, block: SampleBlock) -> Update:
         """Count on over `block`; blocks come in order and do not overlap."""
@@ -44,6 +52,14 @@ class StepCounter(Protocol):
 
     def restore(self, state: Snapshot) -> None:
         """Take over a snapshot's state; SnapshotError where it is another counter's."""
+
+
+def lacking(name: str, needed: Collection[Sensor], has: Collection[Sensor]) -> str | None:
+    """Return the sentence that says what the counter `name` needs and the device has not; None where it has all."""
+    missing = [sensor for sensor in Sensor if sensor in needed and sensor not in has]
+    if not missing:
+        return None
+    return f"{name} needs {', '.join(missing)}; the device has {', '.join(sorted(has)) or 'none'}"
 
 
 Params = TypeVar("Params")
@@ -59,8 +75,22 @@ def choice(default: str, *, options: tuple[str, ...], text: str) -> Any:  # noqa
     return dataclasses.field(default=default, metadata={"options": options, "text": text})
 
 
+def ordered(params: object, lower: str, higher: str, *, equal: bool = False) -> None:
+    """Raise ParameterError, which names both, unless `lower` is less than `higher` (or `equal` to it, where allowed).
+
+    For the `__post_init__` of a counter's parameters, where they may contradict each other.
+    """
+    low, high = getattr(params, lower), getattr(params, higher)
+    if low > high or (low == high and not equal):
+        unit = {f.name: f for f in dataclasses.fields(params)}[higher].metadata["unit"]  # type: ignore[arg-type]
+        raise ParameterError(lower, low, f"{'at most' if equal else 'less than'} {higher}, which is {high:g} {unit}")
+
+
 def with_overrides(params: Params, overrides: Mapping[str, object]) -> Params:
-    """Return `params` with `overrides` (values or their text), each checked; ParameterError says what is wrong."""
+    """Return `params` with `overrides` (values or their text), each checked, then all together.
+
+    ParameterError says what is wrong, or which two contradict each other.
+    """
     fields = {f.name: f for f in dataclasses.fields(params)}  # type: ignore[arg-type]
     changed: dict[str, object] = {}
     for name, value in overrides.items():

@@ -37,9 +37,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from service.counters.contract import choice, parameter
+from service.counters.contract import choice, ordered, parameter
 from service.counters.streaming import KernelCounter
-from service.counters.windowed_peak import Gait, Rules, counter
+from service.counters.windowed_peak import Gait, Rules, check_spacing, counter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +55,11 @@ class ConventionalPeakParams:
     longest_s: float = parameter(1.0, unit="s", low=0.3, high=3, text="most time between steps")
     bout: int = parameter(2, unit="peaks", low=1, high=12, text="peaks that make a bout certain")
     credit: str = choice("never", options=("never", "retrospective"), text="whether the peaks before that count")
+
+    def __post_init__(self) -> None:
+        """Check that some peak can pass; ParameterError names what contradicts what."""
+        ordered(self, "least_g", "most_g")
+        check_spacing(self)
 
 
 PAPER: Final = ConventionalPeakParams()

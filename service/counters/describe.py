@@ -6,7 +6,9 @@ Everything is read from the registry, so that a table cannot say anything else t
 from __future__ import annotations
 
 import dataclasses
+import re
 import sys
+import textwrap
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -16,17 +18,23 @@ from service.counters.registry import CounterKind
 OVERVIEW: Final = ("counter", "needs", "confirms within, paper and tuned", "source")
 PARAMETERS: Final = ("parameter", "paper", "tuned", "range", "unit", "meaning")
 
+SOURCE_COLUMNS: Final = 30
+"""Of a source in a terminal; the guide has it whole."""
+
 Line = tuple[str, ...]
 
 
-def overview() -> list[Line]:
-    """Return a line for each counter: name, sensors, longest time from a step to its confirmation, where it is from."""
+def overview(*, whole: bool = False) -> list[Line]:
+    """Return a line for each counter: name, sensors, longest time from a step to its confirmation, where it is from.
+
+    Its source is shortened to the authors, or `whole`.
+    """
     return [
         (
             kind.name,
             ", ".join(sorted(kind.sensors)),
             f"{_latency_s(kind, 'paper')}, {_latency_s(kind, 'tuned')} s",
-            _source(kind),
+            _source(kind) if whole else _authors(kind),
         )
         for kind in registry.COUNTERS.values()
     ]
@@ -40,7 +48,7 @@ def parameters(name: str) -> list[Line]:
 
 def markdown() -> str:
     """Return the tables of all counters as a part of the guide."""
-    parts = [_table(OVERVIEW, [(f"`{name}`", *rest) for name, *rest in overview()])]
+    parts = [_table(OVERVIEW, [(f"`{name}`", *rest) for name, *rest in overview(whole=True)])]
     for name in registry.COUNTERS:
         lines = [(f"`{key}`", *rest) for key, *rest in parameters(name)]
         parts.append(f"## {name}\n\n{_table(PARAMETERS, lines)}")
@@ -55,6 +63,12 @@ def _source(kind: CounterKind) -> str:
     """Return the first sentence of the counter's module, which names its paper."""
     text = sys.modules[kind.build.__module__].__doc__ or ""
     return text.split("\n\n", maxsplit=1)[0].split("\n", maxsplit=1)[0].strip()
+
+
+def _authors(kind: CounterKind) -> str:
+    """Return what stands before the paper's DOI, without what the counter is called."""
+    before = _source(kind).partition(", doi ")[0]
+    return textwrap.shorten(re.split(": | of ", before)[-1], SOURCE_COLUMNS, placeholder=" …")
 
 
 def _parameter(field: dataclasses.Field[Any], kind: CounterKind) -> Line:

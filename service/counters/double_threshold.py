@@ -32,17 +32,17 @@ On the dev recordings, mean absolute percentage error and false steps an hour; `
 
 | | eth2023 | eth2022 | banglejs | pebble | oxford_opt | hmp | spar | driving, desk |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
-| paper | 73.3 | 20.3 | 19.4 | 13.4 | 16.3 | 5389 | 4426 | 1766 |
-| tuned | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2564 | 37 |
-| axes xz | 17.9 | 26.1 | 11.2 | 4.2 | 5.4 | 1177 | 2886 | 24 |
-| half_width 2 | 18.8 | 7.7 | 14.6 | 3.7 | 2.3 | 1312 | 2492 | 49 |
-| valley_wait 100 | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2767 | 41 |
-| rest_raw 1 | 82.4 | 13.9 | 10.4 | 8.0 | 7.3 | 6316 | 5089 | 1674 |
-| lower_share 0 | 14.3 | 21.2 | 45.5 | 18.0 | 5.9 | 1094 | 2162 | 31 |
-| min_spacing 10 | 24.3 | 5.6 | 14.5 | 8.0 | 8.0 | 1468 | 2898 | 38 |
-| max_spacing 250 | 26.2 | 7.4 | 13.8 | 4.0 | 2.9 | 1471 | 3310 | 126 |
-| credit never | 8.0 | 20.1 | 19.2 | 5.0 | 2.7 | 1019 | 1966 | 15 |
-| bout 2 | 26.0 | 7.1 | 14.3 | 4.0 | 2.9 | 1698 | 3109 | 152 |
+| paper | 73.3 | 20.3 | 19.4 | 13.4 | 16.3 | 5401 | 4427 | 1766 |
+| tuned | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2565 | 37 |
+| axes xz | 17.9 | 26.1 | 11.2 | 4.2 | 5.4 | 1175 | 2886 | 24 |
+| half_width 2 | 18.8 | 7.7 | 14.6 | 3.7 | 2.3 | 1313 | 2493 | 49 |
+| valley_wait 100 | 18.8 | 7.1 | 14.5 | 3.9 | 2.7 | 1285 | 2768 | 41 |
+| rest_raw 1 | 82.4 | 13.9 | 10.4 | 8.1 | 7.3 | 6321 | 5090 | 1674 |
+| lower_share 0 | 14.3 | 21.2 | 45.5 | 18.0 | 5.9 | 1095 | 2163 | 31 |
+| min_spacing 10 | 24.3 | 5.6 | 14.5 | 8.0 | 8.0 | 1469 | 2898 | 38 |
+| max_spacing 250 | 26.1 | 7.4 | 13.8 | 4.0 | 2.9 | 1472 | 3311 | 126 |
+| credit never | 8.0 | 20.1 | 19.2 | 5.0 | 2.7 | 1020 | 1967 | 15 |
+| bout 2 | 26.0 | 7.1 | 14.2 | 4.0 | 2.9 | 1699 | 3110 | 152 |
 
 So rest at 0.18 g rejects most false steps; T_L above L finds the steps it costs (a valley alone in its window passes
 T_L = L only if it lies below the mean before); bouts of five reject short gestures, and walks of four steps with them.
@@ -63,16 +63,20 @@ from numpy.typing import NDArray
 from service.counters import double_threshold_kernel as kernel
 from service.counters.contract import choice, parameter
 from service.counters.streaming import Kernel, KernelCounter
+from service.errors import ParameterError
 from service.samples import GRID_HZ, Band, SampleBlock, Step
 
 FILTER_DELAY: Final = 2
 """Samples by which the five-point mean lags."""
 
+VERSION: Final = 2
+"""Of the state: 1 kept the length of a run, 2 keeps where it began."""
+
+MOST_REST_G: Final = 16.0
+"""No step is larger: with more, all would be rest."""
+
 MOVING_SAMPLES: Final = 300
 """Samples a window length is taken from (section 2.3)."""
-
-NO_RUN: Final = 1e300
-"""Longer than any run of rises or falls."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +98,13 @@ class DoubleThresholdParams:
     window_mode: str = choice("moving", options=("moving", "fixed"), text="window length from the last steps, or fixed")
     first_window: int = parameter(30, unit="samples", low=5, high=150, text="first (or fixed) window length")
     window_limit: int = parameter(60, unit="samples", low=20, high=150, text="a longer mean spacing is halved")
+
+    def __post_init__(self) -> None:
+        """Check that not everything is rest; ParameterError names what contradicts what."""
+        most = MOST_REST_G * self.lsb_per_g
+        if self.rest_raw > most:
+            why = f"at most {most:g}, {MOST_REST_G:g} g, where lsb_per_g is {self.lsb_per_g:g}"
+            raise ParameterError("rest_raw", self.rest_raw, why)
 
     @property
     def longest_window(self) -> int:
@@ -121,7 +132,6 @@ _KERNEL: Final = Kernel(
     scan=kernel.scan,
     close=kernel.close,
     stop=kernel.stop,
-    pending=kernel.pending,
     likely=kernel.likely,
     next_index=kernel.NEXT,
     constants=kernel.CONSTANTS,
@@ -144,6 +154,7 @@ def build(params: DoubleThresholdParams = TUNED) -> KernelCounter:
         room=lambda n: _out_length(n, params),
         events=_events,
         latency_s=_latency_s(params),
+        version=VERSION,
     )
 
 
@@ -170,18 +181,27 @@ def step_rows(block: SampleBlock, params: DoubleThresholdParams = TUNED) -> NDAr
     return steps
 
 
+def sampling(params: DoubleThresholdParams) -> DoubleThresholdParams:
+    """Return the parameters with which a sampling walk is counted: its window does not move, its first steps count."""
+    return replace(params, window_mode="fixed", credit="retrospective")
+
+
+def mean_window(spacings: Sequence[float], params: DoubleThresholdParams) -> int:
+    """Return the window length (6) of these spacings of valid steps, in samples; `first_window` where there is none."""
+    if not spacings:
+        return params.first_window
+    length = sum(spacings) / len(spacings)
+    return int((length / 2 if length > params.window_limit else length) + 0.5)
+
+
 def sampled_window(block: SampleBlock, params: DoubleThresholdParams) -> int:
     """Return the window length (6) of a sampling walk, in samples; `first_window` where it holds no two steps.
 
     Published mode (a): one walk a person and pace, of a set number of steps or a set time.
     """
-    counter = build(replace(params, window_mode="fixed", credit="retrospective"))
+    counter = build(sampling(params))
     steps = counter.update(block).steps + counter.finish().steps
-    spacings = [step.interval_s * GRID_HZ for step in steps if step.interval_s is not None]
-    if not spacings:
-        return params.first_window
-    length = sum(spacings) / len(spacings)
-    return int((length / 2 if length > params.window_limit else length) + 0.5)
+    return mean_window([step.interval_s * GRID_HZ for step in steps if step.interval_s is not None], params)
 
 
 def middle_window(block: SampleBlock, params: DoubleThresholdParams) -> int:
@@ -196,7 +216,7 @@ def _fresh_state(p: DoubleThresholdParams) -> list[float]:
     s = [0.0] * (kernel.QUEUE + capacity * kernel.ENTRY)
     s[kernel.Y_WEIGHT] = 1.0 if p.axes == "norm" else 0.0
     s[kernel.HALF] = float(p.half_width)
-    s[kernel.TIES] = 0.0 if p.ties == "go_on" else NO_RUN
+    s[kernel.GO_ON] = 1.0 if p.ties == "go_on" else 0.0
     s[kernel.VALLEYS] = float(p.valleys)
     s[kernel.WAIT] = float(p.valley_wait)
     s[kernel.REST] = p.rest_raw / p.lsb_per_g
@@ -218,8 +238,8 @@ def _capacity(p: DoubleThresholdParams) -> int:
 
 
 def _out_length(n: int, p: DoubleThresholdParams) -> int:
-    """Floats that n samples and their rows may take: rows come of waiting peaks, new peaks and closed windows."""
-    return n + kernel.ROW * (_capacity(p) + kernel.HELD_MAX + n // 2 + 2)
+    """Floats that n samples, their turns and rows may take: rows come of waiting peaks, new peaks, closed windows."""
+    return 2 * n + kernel.ROW * (_capacity(p) + kernel.HELD_MAX + n // 2 + 2)
 
 
 def _events(rows: Sequence[float]) -> tuple[tuple[Step, ...], tuple[Band, ...]]:
@@ -228,21 +248,8 @@ def _events(rows: Sequence[float]) -> tuple[tuple[Step, ...], tuple[Band, ...]]:
     for i in range(0, len(rows), kernel.ROW):
         kind, a, b, c, d, e, f = rows[i : i + kernel.ROW]
         if kind == kernel.STEP:
-            steps.append(_step(a, b, c, d, e, f))
+            interval_s = b / GRID_HZ if b > 0.0 else None
+            steps.append(Step((a - FILTER_DELAY) / GRID_HZ, c - d, interval_s, c, d, e, f))
         else:
-            bands.append(
-                Band(from_s=(a - FILTER_DELAY) / GRID_HZ, to_s=(b + 1 - FILTER_DELAY) / GRID_HZ, upper=c, lower=d)
-            )
+            bands.append(Band((a - FILTER_DELAY) / GRID_HZ, (b + 1 - FILTER_DELAY) / GRID_HZ, c, d))
     return tuple(steps), tuple(bands)
-
-
-def _step(at: float, spacing: float, peak: float, valley: float, upper: float, lower: float) -> Step:
-    return Step(
-        at_s=(at - FILTER_DELAY) / GRID_HZ,
-        interval_s=spacing / GRID_HZ if spacing > 0.0 else None,
-        strength=peak - valley,
-        peak=peak,
-        valley=valley,
-        upper=upper,
-        lower=lower,
-    )

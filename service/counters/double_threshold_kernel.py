@@ -13,10 +13,12 @@ from collections.abc import MutableSequence, Sequence
 from math import sqrt
 from typing import Final
 
+from service.samples import Likely
+
 # Constants of an instance.
 Y_WEIGHT: Final = 0  # 1 for the norm, 0 for √(X²+Z²)
 HALF: Final = 1  # N of (7), (8)
-TIES: Final = 2  # equal values go on a run longer than this: 0, or more than any run
+GO_ON: Final = 2  # 1: equal values go on a run, 0: they end it
 VALLEYS: Final = 3  # how many valleys a peak may look at
 WAIT: Final = 4  # how many samples it waits for them
 REST: Final = 5  # g; less between peak and valley is rest
@@ -51,9 +53,9 @@ M2: Final = 26
 M3: Final = 27
 M4: Final = 28
 FILTERED: Final = 29  # X(n − 1)
-RUN: Final = 30  # > 0 rises, < 0 falls in a row up to now
-RUN_BEFORE: Final = 31  # length of the opposite run before
-TURN: Final = 32  # the value between both
+RISING: Final = 30  # 1 in a run of rises, −1 of falls, 0 in none
+SINCE: Final = 31  # index of the run's first sample
+TURN: Final = 32  # the value before it
 WINDOW_FROM: Final = 33
 CLOSE_AT: Final = 34
 PEAK_SUM: Final = 35
@@ -62,8 +64,12 @@ VALLEY_SUM: Final = 37
 VALLEYS_SEEN: Final = 38
 HEAD: Final = 39
 COUNT: Final = 40
+RIPE: Final = 41  # index of the sample to come that makes the extremum before the run certain
 
-HELD: Final = 41
+WAITS: Final = 42  # 1: the oldest undecided peak waits for nothing but a valley
+YOUNGEST: Final = 43  # place of the last peak in this state
+
+HELD: Final = 44
 """Rows of `HELD_MAX` valid peaks of a bout that is not certain yet."""
 
 ROW: Final = 7
@@ -85,6 +91,8 @@ ENTRY: Final = 7
 WARM_UP: Final = 5
 """First samples of a stretch in which no extremum counts: the mean (5) is not full yet."""
 
+NEVER: Final = 1e300
+
 BRIDGE: Final = 150.0
 """A bout goes on over a gap if the two steps around it lie less than 3 s apart."""
 
@@ -97,51 +105,72 @@ def begin(s: State, index: int, x: float, y: float, z: float) -> None:
     magnitude = sqrt(x * x + s[Y_WEIGHT] * (y * y) + z * z)
     if s[BOUT_PEAKS] < s[BOUT]:
         s[BOUT_PEAKS] = 0.0
-    for name in (RUN, RUN_BEFORE, TURN, PEAK_SUM, PEAKS, VALLEY_SUM, VALLEYS_SEEN, HEAD, COUNT):
+    for name in (RISING, SINCE, TURN, PEAK_SUM, PEAKS, VALLEY_SUM, VALLEYS_SEEN, HEAD, COUNT, WAITS):
         s[name] = 0.0
     s[M1] = s[M2] = s[M3] = s[M4] = magnitude
     s[FILTERED] = (magnitude + magnitude + magnitude + magnitude + magnitude) / 5.0
     s[FIRST] = s[NEXT] = s[WINDOW_FROM] = float(index)
+    s[RIPE] = NEVER
+    s[YOUNGEST] = QUEUE + (s[CAPACITY] - 1.0) * ENTRY
     s[CLOSE_AT] = s[WINDOW_FROM] + s[WINDOW] - 1.0 + s[HALF]
 
 
 def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
-    """Eat n samples (g); write X(n) to `out[:n]` and rows after it; return where the rows end."""
-    y_weight, half, ties = s[Y_WEIGHT], s[HALF], s[TIES]
-    m1, m2, m3, m4 = s[M1], s[M2], s[M3], s[M4]
-    last, run, run_before, turn = s[FILTERED], s[RUN], s[RUN_BEFORE], s[TURN]
-    k, close_at, end_of_rows = s[NEXT], s[CLOSE_AT], n
+    """Eat n samples (g); write X(n) to `out[:n]` and rows after it; return where the rows end.
+
+    The end of `out` is scratch: for each turn, the place of its run's first sample in the block.
+    """
+    first, last, rising, rows = s[NEXT], s[FILTERED], s[RISING], n
+    half, go_on = s[HALF], s[GO_ON] > 0.0
+    _filter(x, y, z, n, s, out)
+    turns = len(out) - n
+    for t in range(turns, _turns(n, last, rising, out, turns)):
+        i = int(out[t])
+        value, before = out[i], out[i - 1] if i > 0 else last
+        if value > before:
+            now = 1.0
+        elif value < before:
+            now = -1.0
+        else:
+            now = rising if go_on and value == before else 0.0
+        if now != rising:
+            k = first + i
+            if s[RIPE] < k or s[CLOSE_AT] < k:
+                rows = _take(s, k, out, rows)
+            s[RIPE] = k + half - 1.0 if now + rising == 0.0 and k - s[SINCE] >= half else NEVER
+            s[RISING], s[SINCE], s[TURN] = now, k, before
+            rising = now
+    if n > 0:
+        s[FILTERED] = out[n - 1]
+    k = s[NEXT] = first + n
+    return _take(s, k, out, rows) if s[RIPE] < k or s[CLOSE_AT] < k else rows
+
+
+def _filter(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> None:
+    """Write the five-point mean (5) of the magnitude to `out[:n]`; free of branches, for LLVM to make vectors of it."""
+    y_weight, m1, m2, m3, m4 = s[Y_WEIGHT], s[M1], s[M2], s[M3], s[M4]
     for i in range(n):
         a, b, c = x[i], y[i], z[i]
         m = sqrt(a * a + y_weight * (b * b) + c * c)
-        filtered = (m + m1 + m2 + m3 + m4) / 5.0
-        m1, m2, m3, m4 = m, m1, m2, m3
-        out[i] = filtered
-        if filtered > last or (filtered == last and run > ties):
-            if run > 0.0:
-                run += 1.0
-            else:
-                run_before, run, turn = -run, 1.0, last
-            if run == half and run_before >= half:
-                end_of_rows = _valley(s, k - half, turn, out, end_of_rows)
-        elif filtered < last or (filtered == last and run < -ties):
-            if run < 0.0:
-                run -= 1.0
-            else:
-                run_before, run, turn = run, -1.0, last
-            if run == -half and run_before >= half:
-                _peak(s, k - half, turn)
-        else:
-            run = 0.0
-        last = filtered
-        if k == close_at:
-            end_of_rows = _close_window(s, k - half, out, end_of_rows)
-            close_at = s[CLOSE_AT]
-        k += 1.0
+        out[i] = (m + m1 + m2 + m3 + m4) / 5.0
+        m4, m3, m2 = m3, m2, m1
+        m1 = m
     s[M1], s[M2], s[M3], s[M4] = m1, m2, m3, m4
-    s[FILTERED], s[RUN], s[RUN_BEFORE], s[TURN] = last, run, run_before, turn
-    s[NEXT] = k
-    return end_of_rows
+
+
+def _turns(n: int, last: float, rise: float, out: State, to: int) -> int:
+    """Write to `out[to:]` where X(n) does not go on as before it, no matter whether it is level; return where they end.
+
+    Every place is written, the next one over it where nothing turns: a branch would be mispredicted at each turn.
+    """
+    for i in range(n):
+        before, value = rise, out[i]
+        rise, last = value - last, value
+        out[to] = i
+        if rise * before > 0.0:
+            continue
+        to += 1
+    return to
 
 
 def close(s: State, out: State) -> int:
@@ -149,7 +178,7 @@ def close(s: State, out: State) -> int:
     rows = 0
     if s[NEXT] > s[WINDOW_FROM]:
         rows = _close_window(s, s[NEXT] - 1.0, out, rows)
-    return _settle(s, s[NEXT] + s[WAIT] + 1.0, out, rows)
+    return _settle(s, s[NEXT] + s[WAIT] + 1.0, False, 0.0, 0.0, out, rows)
 
 
 def stop(s: State) -> None:
@@ -158,59 +187,104 @@ def stop(s: State) -> None:
     s[BOUT_PEAKS] = 0.0
 
 
-def pending(s: State) -> int:
-    """Return how many peaks are likely to become steps."""
-    return len(likely(s))
+def likely(s: State) -> list[Likely]:
+    """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
-
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return index and height of the peaks that are likely to become steps.
-
-    Those are the held ones of a bout that is not certain yet, and undecided ones above T_H that rise above L by more
-    than rest.
+    Those are the held ones of a bout that can still become certain, and all undecided ones that no rule excludes yet.
+    One passes if it does by the thresholds of the last window and no other that does lies too near before it.
     """
-    found: list[tuple[float, float]] = []
-    if s[CREDIT] > 0.0 and s[BOUT_PEAKS] < s[BOUT] and s[NEXT] - s[HALF] - s[LAST] < s[MAX_SPACING]:
-        for i in range(int(s[BOUT_PEAKS])):
-            held = HELD + i * ROW
-            found.append((s[held + 1], s[held + 3] - s[held + 4]))
-    if s[HIGH_KNOWN] == 0.0 or s[LOW_KNOWN] == 0.0:
-        return found
-    upper, low, rest = (s[HIGH] + s[LOW]) / 2.0, s[LOW], s[REST]
-    head, capacity = int(s[HEAD]), int(s[CAPACITY])
-    for i in range(int(s[COUNT])):
-        q = QUEUE + (head + i) % capacity * ENTRY
-        if s[q + PEAK] > upper and s[q + PEAK] - low >= rest:
-            found.append((s[q + AT], s[q + PEAK] - low))
+    peaks, last = s[BOUT_PEAKS], s[LAST]
+    waiting = _waiting(s, peaks, last) if s[COUNT] > 0.0 else []
+    if not 0.0 < peaks < s[BOUT] or s[CREDIT] == 0.0:
+        return waiting
+    first = waiting[0][0] if waiting else s[NEXT] - s[HALF]
+    if min(first, s[NEXT] - s[HALF]) - last >= s[MAX_SPACING]:
+        return waiting
+    held = range(HELD, HELD + int(peaks) * ROW, ROW)
+    return [(s[i + 1], s[i + 3] - s[i + 4], True) for i in held] + waiting
+
+
+def _waiting(s: State, peaks: float, last: float) -> list[Likely]:
+    """Return the undecided peaks that no rule excludes yet."""
+    found: list[Likely] = []
+    nearest, rest, in_force = s[MIN_SPACING], s[REST], s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    low = s[LOW] if in_force else s[FILTERED]
+    upper = (s[HIGH] + low) / 2.0
+    after = sure_after = last + nearest if peaks > 0.0 else -1.0
+    short = 0.0 if s[CREDIT] > 0.0 else s[BOUT] - peaks - 1.0
+    q, end = QUEUE + int(s[HEAD]) * ENTRY, QUEUE + int(s[CAPACITY]) * ENTRY
+    for _ in range(int(s[COUNT])):
+        at, peak, known = s[q + AT], s[q + PEAK], s[q + CLOSED] > 0.0
+        excluded = at <= after or (
+            known and (peak <= s[q + UPPER] or (s[q + SEEN] >= s[VALLEYS] and s[q + VALLEY] >= s[q + LOWER]))
+        )
+        q += ENTRY
+        if q == end:
+            q = QUEUE
+        if excluded:
+            continue
+        if short > 0.0:
+            short -= 1.0  # a reference at most
+            continue
+        height = peak - low
+        passes = in_force and peak > upper and height >= rest and at > sure_after
+        if passes:
+            sure_after = at + nearest
+        found.append((at, height if height > 0.0 else 0.0, passes))  # noqa: FURB136  # a call costs more
     return found
+
+
+def _take(s: State, k: float, out: State, rows: int) -> int:
+    """Take the extremum that is certain and the windows that are over before sample k."""
+    ripe = s[RIPE]
+    while s[CLOSE_AT] < k:
+        if ripe <= s[CLOSE_AT]:
+            rows, ripe = _extremum(s, s[SINCE] - 1.0, out, rows), NEVER
+        rows = _close_window(s, s[CLOSE_AT] - s[HALF], out, rows)
+    if ripe < k:
+        return _extremum(s, s[SINCE] - 1.0, out, rows)
+    return rows
+
+
+def _extremum(s: State, at: float, out: State, rows: int) -> int:
+    """Take the peak or valley before the run; none counts before the mean (5) is full."""
+    s[RIPE] = NEVER
+    if at < s[FIRST] + WARM_UP:
+        return rows
+    if s[RISING] > 0.0:
+        return _valley(s, at, s[TURN], out, rows)
+    _peak(s, at, s[TURN])
+    return rows
 
 
 def _peak(s: State, at: float, value: float) -> None:
     """Add a peak to the window's mean and to the queue."""
-    if at < s[FIRST] + WARM_UP:
-        return
     s[PEAK_SUM] += value
     s[PEAKS] += 1.0
-    q = QUEUE + int(s[HEAD] + s[COUNT]) % int(s[CAPACITY]) * ENTRY
-    s[q + AT], s[q + PEAK] = at, value
-    s[q + SEEN] = s[q + VALLEY] = s[q + CLOSED] = s[q + UPPER] = s[q + LOWER] = 0.0
     s[COUNT] += 1.0
+    q = int(s[YOUNGEST]) + ENTRY
+    if q == QUEUE + int(s[CAPACITY]) * ENTRY:
+        q = QUEUE
+    s[YOUNGEST] = float(q)
+    s[q + AT], s[q + PEAK] = at, value
+    s[q + SEEN] = s[q + CLOSED] = 0.0
 
 
 def _valley(s: State, at: float, value: float, out: State, rows: int) -> int:
     """Add a valley to the window's mean and show it to the peaks that wait for one."""
-    if at < s[FIRST] + WARM_UP:
-        return rows
     s[VALLEY_SUM] += value
     s[VALLEYS_SEEN] += 1.0
-    head, capacity = int(s[HEAD]), int(s[CAPACITY])
-    for i in range(int(s[COUNT])):
-        q = QUEUE + (head + i) % capacity * ENTRY
-        if s[q + SEEN] < s[VALLEYS] and at - s[q + AT] <= s[WAIT]:
-            if s[q + SEEN] == 0.0 or value < s[q + VALLEY]:
-                s[q + VALLEY] = value
-            s[q + SEEN] += 1.0
-    return _settle(s, at, out, rows)
+    q, end = int(s[YOUNGEST]), QUEUE + int(s[CAPACITY]) * ENTRY
+    valleys, wait = s[VALLEYS], s[WAIT]
+    for _ in range(int(s[COUNT])):
+        seen = s[q + SEEN]
+        if seen >= valleys or at - s[q + AT] > wait:
+            break  # nor does an older one wait
+        if seen == 0.0 or value < s[q + VALLEY]:
+            s[q + VALLEY] = value
+        s[q + SEEN] = seen + 1.0
+        q = (q if q > QUEUE else end) - ENTRY
+    return _settle(s, at, False, 0.0, 0.0, out, rows) if s[WAITS] > 0.0 else rows
 
 
 def _close_window(s: State, to: float, out: State, rows: int) -> int:
@@ -222,21 +296,26 @@ def _close_window(s: State, to: float, out: State, rows: int) -> int:
         s[LOW] = _mean(s[VALLEY_SUM], s[VALLEYS_SEEN], s[LOW], s[LOW_KNOWN])
         s[LOW_KNOWN] = 1.0
     s[PEAK_SUM] = s[PEAKS] = s[VALLEY_SUM] = s[VALLEYS_SEEN] = 0.0
-    upper = (s[HIGH] + s[LOW]) / 2.0
-    lower = s[LOW] + s[LOWER_SHARE] * (s[HIGH] - s[LOW])
-    known = s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    high, low, known = s[HIGH], s[LOW], s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
+    upper, lower = (high + low) / 2.0, low + s[LOWER_SHARE] * (high - low)
     if known:
         rows = _row(out, rows, BAND, s[WINDOW_FROM], to, upper, lower, 0.0, 0.0)
-    head, capacity = int(s[HEAD]), int(s[CAPACITY])
-    for i in range(int(s[COUNT])):
-        q = QUEUE + (head + i) % capacity * ENTRY
-        if s[q + CLOSED] == 0.0:
-            s[q + CLOSED] = 1.0
-            s[q + UPPER] = upper if known else s[q + PEAK]
-            s[q + LOWER] = lower
+    else:
+        upper = NEVER
     s[WINDOW_FROM] = to + 1.0
     s[CLOSE_AT] = to + s[WINDOW] + s[HALF]
-    return _settle(s, to, out, rows)
+    rows = _settle(s, to, True, upper, lower, out, rows)
+    if s[WAITS] > 0.0:
+        _close_peaks(s, upper, lower)
+    return rows
+
+
+def _close_peaks(s: State, upper: float, lower: float) -> None:
+    """Give the window's thresholds to those of its peaks that are behind one that waits."""
+    q, end = int(s[YOUNGEST]), QUEUE + int(s[CAPACITY]) * ENTRY
+    while s[q + CLOSED] == 0.0:
+        s[q + CLOSED], s[q + UPPER], s[q + LOWER] = 1.0, upper, lower
+        q = (q if q > QUEUE else end) - ENTRY
 
 
 def _mean(total: float, count: float, before: float, known: float) -> float:
@@ -246,19 +325,27 @@ def _mean(total: float, count: float, before: float, known: float) -> float:
     return total / count
 
 
-def _settle(s: State, now: float, out: State, rows: int) -> int:
-    """Decide the oldest peaks, in order, as far as their thresholds and valleys are known at sample `now`."""
+def _settle(s: State, now: float, closing: bool, upper: float, lower: float, out: State, rows: int) -> int:
+    """Decide the oldest peaks, in order, as far as their thresholds and valleys are known at sample `now`.
+
+    Where a window is `closing`, `upper` and `lower` are the thresholds of the peaks that had none.
+    """
     head, count, capacity = int(s[HEAD]), int(s[COUNT]), int(s[CAPACITY])
+    s[WAITS] = 0.0
     while count > 0:
         q = QUEUE + head * ENTRY
         if s[q + CLOSED] == 0.0:
-            break
-        if s[q + PEAK] > s[q + UPPER]:
-            if s[q + SEEN] > 0.0 and s[q + VALLEY] < s[q + LOWER]:
-                rows = _valid(s, q, out, rows)
-            elif s[q + SEEN] < s[VALLEYS] and now - s[q + AT] <= s[WAIT]:
+            if not closing:
                 break
-        head = (head + 1) % capacity
+            s[q + CLOSED], s[q + UPPER], s[q + LOWER] = 1.0, upper, lower
+        if s[q + PEAK] > s[q + UPPER]:
+            seen = s[q + SEEN]
+            if seen > 0.0 and s[q + VALLEY] < s[q + LOWER]:
+                rows = _valid(s, q, out, rows)
+            elif seen < s[VALLEYS] and now - s[q + AT] <= s[WAIT]:
+                s[WAITS] = 1.0
+                break
+        head = head + 1 if head + 1 < capacity else 0
         count -= 1
     s[HEAD], s[COUNT] = float(head), float(count)
     return rows
@@ -266,28 +353,28 @@ def _settle(s: State, now: float, out: State, rows: int) -> int:
 
 def _valid(s: State, q: int, out: State, rows: int) -> int:
     """Sort false steps out (17) and write the peak at queue place `q` as a step, once its bout is certain."""
-    at, known = s[q + AT], s[BOUT_PEAKS] > 0.0
-    spacing = at - s[LAST]
-    if s[q + PEAK] - s[q + VALLEY] < s[REST] or (known and spacing <= s[MIN_SPACING]):
+    at, last, peaks = s[q + AT], s[LAST], s[BOUT_PEAKS]
+    spacing = at - last
+    if (peaks > 0.0 and spacing <= s[MIN_SPACING]) or s[q + PEAK] - s[q + VALLEY] < s[REST]:
         return rows
-    over_gap = s[LAST] < s[FIRST]
-    if not known or spacing >= (BRIDGE if over_gap else s[MAX_SPACING]):
-        s[BOUT_PEAKS] = spacing = 0.0
+    over_gap = last < s[FIRST]
+    if peaks == 0.0 or spacing >= (BRIDGE if over_gap else s[MAX_SPACING]):
+        peaks = spacing = 0.0
     elif over_gap:
         spacing = 0.0  # how many steps the gap hides is unknown
     else:
         _learn(s, spacing)
-    s[LAST] = at
-    s[BOUT_PEAKS] += 1.0
-    if s[BOUT_PEAKS] > s[BOUT]:
+    peaks += 1.0
+    s[LAST], s[BOUT_PEAKS] = at, peaks
+    if peaks > s[BOUT]:
         return _row(out, rows, STEP, at, spacing, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
-    last = HELD + (int(s[BOUT_PEAKS]) - 1) * ROW
-    _row(s, last, STEP, at, spacing, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
-    if s[BOUT_PEAKS] < s[BOUT]:
+    held = HELD + (int(peaks) - 1) * ROW
+    end = _row(s, held, STEP, at, spacing, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
+    if peaks < s[BOUT]:
         return rows
     if s[CREDIT] == 0.0:
         return _row(out, rows, STEP, at, 0.0, s[q + PEAK], s[q + VALLEY], s[q + UPPER], s[q + LOWER])
-    for i in range(HELD, last + ROW):
+    for i in range(HELD, end):
         out[rows] = s[i]
         rows += 1
     return rows

@@ -9,7 +9,9 @@ and `atan2`.
 from __future__ import annotations
 
 from math import sqrt
+from typing import Final
 
+from service.counters.fusion_ahead import coming_peaks
 from service.counters.fusion_checks import (
     CHANNELS,
     DEPTH,
@@ -37,6 +39,7 @@ from service.counters.fusion_state import (
     KIND,
     LAGS,
     LATEST,
+    MATCHED,
     MAX_STEP,
     MOTION,
     NEVER,
@@ -46,6 +49,7 @@ from service.counters.fusion_state import (
     PEAK,
     PEAK_AT,
     PEAK_VALUE,
+    PERIOD,
     PREVIOUS,
     RAW,
     REJECT,
@@ -62,8 +66,12 @@ from service.counters.fusion_state import (
     State,
 )
 from service.counters.fusion_steps import end_bout, take_pair
+from service.samples import Likely
 from service.signals.orientation import advance, horizontal
 from service.signals.orientation import begin as begin_orientation
+
+SWING_REJECT: Final = 0.5
+"""(5): a half-step by the swing is no guess that a bump can have spoilt, so the share need not be milder."""
 
 
 def begin(
@@ -87,7 +95,8 @@ def begin(
     s[A1] = s[A2] = norm
     s[VALLEY_VALUE] = NEVER
     _forget(s)
-    s[PREVIOUS] = s[BEFORE_LAST] = -1.0
+    s[PREVIOUS] = s[BEFORE_LAST] = s[MATCHED] = -1.0
+    s[PERIOD] = 0.0
     begin_orientation(s, ORIENTATION, ax, ay, az, mx, my, mz)
     first = (ax, ay, az, gx, gy, gz, mx, my, mz)
     for axis in range(AXES):
@@ -154,27 +163,31 @@ def stop(s: State) -> None:
     end_bout(s)
 
 
-def pending(s: State) -> int:
-    """Return how many steps are likely."""
-    return len(likely(s))
+def likely(s: State) -> list[Likely]:
+    """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
-
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return index and height of the peaks that are likely to become steps.
-
-    Those are the held ones of a bout that is not certain yet, and the last peak if it rises by more than rest above its
-    valley, or above the one before as long as its own has not come.
+    Those are the held ones of a bout that can still become certain, the last peak, and those that the filter is about
+    to let out. One passes if it rises by more than rest above its valley, or above the one before as long as its own
+    has not come.
     """
-    found: list[tuple[float, float]] = []
-    if s[BOUT_STEPS] < s[BOUT] and s[NEXT] - s[ACCEPTED] < s[MAX_STEP]:
-        for i in range(int(s[BOUT_STEPS])):
-            held = HELD + i * ROW
-            found.append((s[held], s[held + 2] - s[held + 3]))
+    found: list[Likely] = []
     at, value, valley = s[PEAK_AT], s[PEAK_VALUE], s[VALUE]
     if s[KIND] == PEAK:
         at, value, valley = s[AT], s[VALUE], s[VALLEY_VALUE]
-    if at >= 0.0 and s[NEXT] - at <= s[PAUSE] and value - valley > s[REST]:
-        found.append((at, value - valley))
+    waits = s[KIND] != 0.0 and at >= 0.0 and (s[KIND] == VALLEY or s[NEXT] - at <= s[PAUSE] + 1.0)
+    newest = at if waits else s[NEXT] - 2.0
+    if 0.0 < s[BOUT_STEPS] < s[BOUT] and min(newest, s[NEXT] - 2.0) - s[ACCEPTED] < s[MAX_STEP]:
+        for i in range(int(s[BOUT_STEPS])):
+            held = HELD + i * ROW
+            found.append((s[held], s[held + 2] - s[held + 3], True))
+    if waits:
+        height = value - valley
+        found.append((at, height if 0.0 < height < value else 0.0, height > s[REST]))
+    if s[NEXT] >= 0.0:
+        valley = s[VALUE] if s[KIND] == VALLEY else s[VALLEY_VALUE]
+        for coming, value in coming_peaks(s):
+            passes = s[KIND] == VALLEY and value - valley > s[REST]
+            found.append((coming, value - valley if valley < value else 0.0, passes))
     return found
 
 
@@ -205,13 +218,20 @@ def _extremum(s: State, kind: float, at: float, value: float, out: State, rows: 
     if s[KIND] == 0.0:
         since = s[HALF]
     else:
-        if since <= s[REJECT] * s[HALF] and since <= s[LATEST]:
+        if since <= _too_soon(s, at) and since <= s[LATEST]:
             return rows
         rows = _final(s, int(at), out, rows)
         s[BEFORE], s[HALF] = s[AT], since
     s[KIND], s[AT], s[VALUE] = kind, at, value
     s[DUE] = at + s[UPDATE] * since
     return rows
+
+
+def _too_soon(s: State, at: float) -> float:
+    """Return th_s (5), from the swing's time of a step where it is known: then the share is the printed one."""
+    if s[PERIOD] > 0.0 and at - s[PREVIOUS] < s[MAX_STEP]:
+        return SWING_REJECT * 0.5 * s[PERIOD]
+    return s[REJECT] * s[HALF]
 
 
 def _final(s: State, now: int, out: State, rows: int) -> int:

@@ -31,7 +31,8 @@ TRUST: Final = 15  # 1: the first three pass even when suspect
 BOUT: Final = 16
 LATEST: Final = 17  # samples: th_s is never longer
 FIRST_HALF: Final = 18  # samples: Δt₁ before there is one
-BANK: Final = 19
+TURNS: Final = 19  # 1: a swing's turns are matched one to one, and tell the step's time
+BANK: Final = 20
 """Five filters of `FILTER` floats: lag of their input, b₀, a₁, a₂ (b₁ = 2 b₀, b₂ = b₀)."""
 FILTER: Final = 4
 FILTERS: Final = 5
@@ -64,7 +65,9 @@ VALLEY_VALUE: Final = CONSTANTS + 20  # of the last final valley
 CROSSING: Final = CONSTANTS + 21  # (9) of the last pair
 PREVIOUS: Final = CONSTANTS + 22  # index of the last pair's peak; −1 none
 BEFORE_LAST: Final = CONSTANTS + 23  # of the one before
-ORIENTATION: Final = CONSTANTS + 24
+MATCHED: Final = CONSTANTS + 24  # the turn of the swing that the last step was matched with
+PERIOD: Final = CONSTANTS + 25  # samples a step takes by the swing, at the last pair; 0 unknown
+ORIENTATION: Final = CONSTANTS + 26
 Y1: Final = ORIENTATION + orientation.SIZE
 """The nine filtered columns, one and two samples ago."""
 AXES: Final = 9

@@ -7,6 +7,7 @@ valley, pseudo zero crossing, displacement in m, direction in rad)`.
 from __future__ import annotations
 
 from math import sin, sqrt
+from typing import Final
 
 from service.counters.fusion_checks import (
     DEPTH,
@@ -42,11 +43,13 @@ from service.counters.fusion_state import (
     HELD,
     IRREGULAR,
     JUMP,
+    MATCHED,
     MAX_STEP,
     MEASURED,
     MOTION,
     PEAK_AT,
     PEAK_VALUE,
+    PERIOD,
     PERIODIC,
     PREVIOUS,
     QUARTER,
@@ -57,9 +60,14 @@ from service.counters.fusion_state import (
     TOLERANCE,
     TRUST,
     TUNED_TO,
+    TURNS,
     VALUE,
     State,
 )
+from service.counters.fusion_swing import STILL, TAKEN, look
+
+MIRRORED: Final = -0.7
+"""Correlation of a step's swing with the one before from which on it is even: its extrema may then lie anywhere."""
 
 
 def take_pair(s: State, now: int, out: State, rows: int) -> int:
@@ -69,10 +77,15 @@ def take_pair(s: State, now: int, out: State, rows: int) -> int:
         end_bout(s)
     crossing = (s[PEAK_VALUE] + s[VALUE]) / 2.0
     suspect = s[PREVIOUS] >= 0.0 and (s[PEAK_VALUE] <= s[CROSSING] or s[VALUE] >= s[CROSSING])
-    if s[DELTA] <= 0.0 or delta - s[DELTA] > s[JUMP] or delta - s[DELTA] < -s[JUMP]:
+    first, last, shift = int(s[PREVIOUS]), int(at), int(s[DELAY])
+    turn = STILL
+    if s[TURNS] > 0.0:
+        turn = look(s, first, last, min(last + _reach(s, last - first), now - 1))
+    if s[PERIOD] > 0.0:
+        _tune(s, 0.5 * s[PERIOD])
+    elif s[DELTA] <= 0.0 or delta - s[DELTA] > s[JUMP] or delta - s[DELTA] < -s[JUMP]:
         _tune(s, s[AT] - at)
     s[DELTA], s[CROSSING] = delta, crossing
-    first, last, shift = int(s[PREVIOUS]), int(at), int(s[DELAY])
     before = int(s[BEFORE_LAST])
     s[BEFORE_LAST], s[PREVIOUS] = s[PREVIOUS], at
     measured = first >= 0 and last - first < s[MAX_STEP]
@@ -80,8 +93,13 @@ def take_pair(s: State, now: int, out: State, rows: int) -> int:
     if measured:
         heading = direction(s, MOTION, first - shift, last - shift)
         distance = _distance(s, heading, first - shift, last - shift)
-        if not suspect:
-            suspect = _unmatched(s, before, first, last, now)
+        gyro = main_axis(s, MOTION, GYROSCOPE, first, last)
+        if not suspect and variance(s, MOTION, gyro, first, last) > s[SWING]:
+            if turn == TAKEN:
+                return rows
+            if turn >= 0:
+                s[MATCHED] = float(turn)
+            suspect = _unmatched(s, gyro, before, first, last, now)
     if not _far_enough(s, measured, distance, suspect):
         return rows
     return _step(s, at, crossing, distance, heading, out, rows)
@@ -113,31 +131,35 @@ def _distance(s: State, heading: float, first: int, last: int) -> float:
     return sqrt(north * north + east * east)
 
 
-def _unmatched(s: State, before: int, first: int, last: int, now: int) -> bool:
-    """Tell whether the device swings but its gyroscope, or a trustworthy magnetometer, does not go with the step."""
-    gyro = main_axis(s, MOTION, GYROSCOPE, first, last)
-    if variance(s, MOTION, gyro, first, last) <= s[SWING]:
-        return False
+def _unmatched(s: State, gyro: int, before: int, first: int, last: int, now: int) -> bool:
+    """Tell whether the main axis of a device that swings, or its trusted magnetometer's, does not go with the step."""
     mag = main_axis(s, MOTION, MAGNETOMETER, first, last)
     step = last - first
+    rho = 0.0
     swings = turns = False
     if before >= 0 and first - before < s[MAX_STEP] and now - (first - step) < DEPTH and s[FIRST] <= first - step:
-        swings = _periodic(s, gyro, first, last)
-        turns = _periodic(s, mag, first, last)
+        rho = correlation(s, MOTION, gyro, first, last, step)
+        swings = _periodic(s, rho)
+        turns = _periodic(s, correlation(s, MOTION, mag, first, last, step))
     if s[IRREGULAR] > 0.0 and not swings:
         return True
-    reach = int(s[TOLERANCE] * float(step)) + 1
+    reach = _reach(s, step)
     to = min(last + reach, now - 1)
-    if not has_extremum(s, MOTION, gyro, last - reach, to):
+    mirrored = s[TURNS] > 0.0 and rho <= MIRRORED
+    if not mirrored and not has_extremum(s, MOTION, gyro, last - reach, to):
         return True
     disturbed = field_movement(s, MOTION, first, last) > s[FIELD] or (swings and not turns)
     return not disturbed and not has_extremum(s, MOTION, mag, last - reach, to)
 
 
-def _periodic(s: State, channel: int, first: int, last: int) -> bool:
+def _periodic(s: State, rho: float) -> bool:
     """Tell whether a step's swing is that of the step before, or its mirror image: it runs at half the step rate."""
-    rho = correlation(s, MOTION, channel, first, last, last - first)
     return rho >= s[PERIODIC] or rho <= -s[PERIODIC]
+
+
+def _reach(s: State, step: int) -> int:
+    """Return how far an extremum may be from its peak."""
+    return int(s[TOLERANCE] * float(step)) + 1
 
 
 def _far_enough(s: State, measured: bool, distance: float, suspect: bool) -> bool:

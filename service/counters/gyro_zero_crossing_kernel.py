@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import MutableSequence, Sequence
 from typing import Final
 
+from service.samples import Likely
+
 # Constants of an instance.
 AXIS: Final = 0  # 0, 1, 2; LARGEST follows the axis of largest variance
 PEAK_THRESHOLD: Final = 1  # rad/s
@@ -28,37 +30,45 @@ DELAY: Final = 11  # samples by which the filter lags
 GAIN: Final = 12  # of the three sections together
 A: Final = 13  # a₁, a₂ of each section
 CAPACITY: Final = 19  # of the queue of held steps
-CONSTANTS: Final = 20
+WIDEST: Final = 20  # rad/s × samples from a crossing to its extremum; a wider swing is no step's
+SLOW_WAIT: Final = 21  # samples; WAIT of a slow swing, no less than WAIT
+SLOW_SPACING: Final = 22  # samples; MAX_SPACING of slow swings, no less than MAX_SPACING
+SLOW_LEAST: Final = 23  # rad/s × samples; a slow swing is wider
+SLOW_WIDEST: Final = 24  # and no wider than this
+EVEN: Final = 25  # one spacing of slow swings is at most so many times another
+CONSTANTS: Final = 26
 
 # Belief: it outlasts a gap.
-CHOSEN: Final = 20  # the axis in use
-BIAS: Final = 21  # mean rate at rest of each axis, rad/s
-VARIANCE: Final = 24  # of each axis while it moves, rad²/s²
-COUNTED_FROM: Final = 27  # index from which the start delay is over; −1 before the first stretch
+CHOSEN: Final = 26  # the axis in use
+BIAS: Final = 27  # mean rate at rest of each axis, rad/s
+VARIANCE: Final = 30  # of each axis while it moves, rad²/s²
+COUNTED_FROM: Final = 33  # index from which the start delay is over; −1 before the first stretch
 
 # The bout and what is held: certain steps outlast a gap.
-BOUT_STEPS: Final = 28
-LAST: Final = 29  # the last confirmed crossing
-HEAD: Final = 30
-COUNT: Final = 31  # steps held
-UNSURE: Final = 32  # the newest of them whose bout is not certain
-DUE: Final = 33  # index at which the oldest certain one is to be given out
+BOUT_STEPS: Final = 34
+LAST: Final = 35  # the last confirmed crossing
+HEAD: Final = 36
+COUNT: Final = 37  # steps held
+UNSURE: Final = 38  # the newest of them whose bout is not certain
+PACE: Final = 39  # the last spacing in the bout; 0 none
+DUE: Final = 40  # index at which the oldest certain one is to be given out
 
 # The stretch: it ends with a gap.
-NEXT: Final = 34  # index of the sample to come; −1 before the first stretch and after the last
-FIRST: Final = 35  # index of its first sample
-SETTLED: Final = 36  # crossings before this are of the filter's start
-FILTER: Final = 37  # two values of each section
-FILTERED: Final = 43  # the filtered rate before
-POLARITY: Final = 44  # sign after the last crossing taken; 0 at the start
-CANDIDATE: Final = 45  # 1 waits for a peak, −1 for a valley
-CROSSED: Final = 46  # where that candidate crossed
-LOOK: Final = 47  # index of the next sample that is looked at
-LOOKS: Final = 48  # samples looked at in this look-out
-SUMS: Final = 49  # of each axis over them
-SQUARES: Final = 52
+NEXT: Final = 41  # index of the sample to come; −1 before the first stretch and after the last
+FIRST: Final = 42  # index of its first sample
+SETTLED: Final = 43  # crossings before this are of the filter's start
+FILTER: Final = 44  # two values of each section
+FILTERED: Final = 50  # the filtered rate before
+POLARITY: Final = 51  # sign after the last crossing taken; 0 at the start
+CANDIDATE: Final = 52  # 1 waits for a peak, −1 for a valley
+CROSSED: Final = 53  # where that candidate crossed
+SWEPT: Final = 54  # sum of the filtered rate since the last crossing
+LOOK: Final = 55  # index of the next sample that is looked at
+LOOKS: Final = 56  # samples looked at in this look-out
+SUMS: Final = 57  # of each axis over them
+SQUARES: Final = 60
 
-QUEUE: Final = 55
+QUEUE: Final = 63
 """A ring of held steps: crossing, spacing, extremum, threshold."""
 
 ENTRY: Final = 4
@@ -109,23 +119,27 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
     gain, a1, a2, b1, b2, c1, c2 = s[GAIN], s[A], s[A + 1], s[A + 2], s[A + 3], s[A + 4], s[A + 5]
     p1, p2, q1, q2, r1, r2 = s[FILTER], s[FILTER + 1], s[FILTER + 2], s[FILTER + 3], s[FILTER + 4], s[FILTER + 5]
     chosen = s[CHOSEN]
-    rate, bias = _column(x, y, z, chosen), s[BIAS + int(chosen)]
-    last, candidate, k, look, due, rows = s[FILTERED], s[CANDIDATE], s[NEXT], s[LOOK], s[DUE], n
+    rate = x if chosen == 0.0 else y if chosen == 1.0 else z
+    bias = s[BIAS + int(chosen)]
+    last, candidate, swept, k, look = s[FILTERED], s[CANDIDATE], s[SWEPT], s[NEXT], s[LOOK]
+    due, rows = s[DUE], n
     for i in range(n):
         p = (rate[i] - bias) * gain - a1 * p1 - a2 * p2
         q = p + p1 + p1 + p2 - b1 * q1 - b2 * q2
         r = q + q1 + q1 + q2 - c1 * r1 - c2 * r2
         filtered = r + r1 + r1 + r2
-        p1, p2, q1, q2, r1, r2 = p, p1, q, q1, r, r1
+        p2, q2, r2 = p1, q1, r1
+        p1, q1, r1 = p, q, r
         out[i] = filtered
         if candidate * (last - filtered) > 0.0:
-            candidate, rows = _extremum(s, k, last, out, rows)
+            candidate, rows = _extremum(s, k, last, swept, out, rows)
             due = s[DUE]
         if filtered > 0.0:
             if last <= 0.0 and s[POLARITY] <= 0.0:
-                candidate = _cross(s, k - filtered / (filtered - last), 1.0)
+                candidate, swept = _cross(s, k - filtered / (filtered - last), 1.0), 0.0
         elif last >= 0.0 > filtered and s[POLARITY] >= 0.0:
-            candidate = _cross(s, k - filtered / (filtered - last), -1.0)
+            candidate, swept = _cross(s, k - filtered / (filtered - last), -1.0), 0.0
+        swept += filtered
         last = filtered
         if k >= due:
             rows = _give_out(s, k, out, rows)
@@ -135,13 +149,13 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
             rows = _look(s, k, x[i], y[i], z[i], out, rows)
             if s[CHOSEN] != chosen or filtered != filtered:  # noqa: PLR0124  # NaN would stay in the filter
                 chosen = s[CHOSEN]
-                rate = _column(x, y, z, chosen)
-                p1 = p2 = q1 = q2 = r1 = r2 = last = candidate = 0.0
+                rate = x if chosen == 0.0 else y if chosen == 1.0 else z
+                p1 = p2 = q1 = q2 = r1 = r2 = last = candidate = swept = 0.0
                 _restart(s, k + 1.0)
             bias = s[BIAS + int(chosen)]
         k += 1.0
     s[FILTER], s[FILTER + 1], s[FILTER + 2], s[FILTER + 3], s[FILTER + 4], s[FILTER + 5] = p1, p2, q1, q2, r1, r2
-    s[FILTERED], s[CANDIDATE], s[NEXT], s[LOOK] = last, candidate, k, look
+    s[FILTERED], s[CANDIDATE], s[SWEPT], s[NEXT], s[LOOK] = last, candidate, swept, k, look
     return rows
 
 
@@ -154,42 +168,36 @@ def close(s: State, out: State) -> int:  # noqa: ARG001  # nothing is decided he
 def stop(s: State) -> None:
     """End the stream: the phone has been taken out, so what is still held is taken back; start over with a delay."""
     s[NEXT] = s[COUNTED_FROM] = -1.0
-    s[BOUT_STEPS] = s[HEAD] = s[COUNT] = s[UNSURE] = 0.0
+    s[BOUT_STEPS] = s[HEAD] = s[COUNT] = s[UNSURE] = s[PACE] = 0.0
     s[DUE] = NEVER
 
 
-def pending(s: State) -> int:
-    """Return how many steps are likely."""
-    return len(likely(s))
+def likely(s: State) -> list[Likely]:
+    """Return every crossing that can still become a step: where, how strong, and whether it is past its threshold.
 
-
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return where and how strong: steps held, unless their bout has ended, and a crossing past its threshold."""
-    found: list[tuple[float, float]] = []
+    Those are the held ones, unless their bout has ended, and the one that waits for its extremum.
+    """
+    found: list[Likely] = []
+    waits = s[CANDIDATE] != 0.0 and s[NEXT] - s[CROSSED] <= s[SLOW_WAIT] + 1.0
     if s[COUNT] > 0.0:
-        ended = s[NEXT] - s[LAST] - s[WAIT] >= s[MAX_SPACING]
+        ended = s[NEXT] - s[LAST] - s[SLOW_WAIT] >= s[SLOW_SPACING]
+        if waits and s[CROSSED] - s[LAST] < s[SLOW_SPACING]:
+            ended = False
         head, capacity = int(s[HEAD]), int(s[CAPACITY])
         for i in range(int(s[COUNT] - s[UNSURE] if ended else s[COUNT])):
             q = QUEUE + (head + i) % capacity * ENTRY
-            found.append((s[q], abs(s[q + 2])))
-    if s[CANDIDATE] != 0.0 and s[NEXT] - s[CROSSED] <= s[WAIT]:
+            found.append((s[q], abs(s[q + 2]), True))
+    if waits:
         past = s[FILTERED] > s[PEAK_THRESHOLD] if s[CANDIDATE] > 0.0 else s[FILTERED] < s[VALLEY_THRESHOLD]
-        if past:
-            found.append((s[CROSSED], abs(s[FILTERED])))
+        found.append((s[CROSSED], abs(s[FILTERED]), past))
     return found
-
-
-def _column(x: Floats, y: Floats, z: Floats, chosen: float) -> Floats:
-    if chosen == 0.0:
-        return x
-    return y if chosen == 1.0 else z
 
 
 def _restart(s: State, index: float) -> None:
     """Start filter and crossings afresh at sample `index`, from rest."""
     for i in range(FILTER, FILTERED + 1):
         s[i] = 0.0
-    s[POLARITY] = s[CANDIDATE] = s[CROSSED] = 0.0
+    s[POLARITY] = s[CANDIDATE] = s[CROSSED] = s[SWEPT] = 0.0
     s[SETTLED] = max(index, s[COUNTED_FROM]) + s[DELAY]
 
 
@@ -204,28 +212,38 @@ def _cross(s: State, at: float, sign: float) -> float:
     return 0.0
 
 
-def _extremum(s: State, k: float, value: float, out: State, rows: int) -> tuple[float, int]:
+def _extremum(s: State, k: float, value: float, swept: float, out: State, rows: int) -> tuple[float, int]:
     """Weigh the extremum seen at sample `k`; return what the candidate is then, and where the rows end."""
-    candidate = s[POLARITY]
+    candidate, waited = s[POLARITY], k - s[CROSSED]
+    wide = candidate * swept
     enough = value > s[PEAK_THRESHOLD] if candidate > 0.0 else value < s[VALLEY_THRESHOLD]
-    if k - s[CROSSED] > s[WAIT]:
+    if wide > s[WIDEST] or waited > s[SLOW_WAIT] or (waited > s[WAIT] and not _slow(s, wide)):
         return 0.0, rows
     if enough:
-        return 0.0, _confirm(s, k, value, out, rows)
+        return 0.0, _confirm(s, k, value, wide, out, rows)
     return 0.0 if s[FIRST_ONLY] > 0.0 else candidate, rows
 
 
-def _confirm(s: State, k: float, value: float, out: State, rows: int) -> int:
+def _slow(s: State, wide: float) -> bool:
+    """Tell whether a swing is as wide as a slow walker's."""
+    return s[SLOW_LEAST] < wide <= s[SLOW_WIDEST]
+
+
+def _confirm(s: State, k: float, value: float, wide: float, out: State, rows: int) -> int:
     """Take the candidate as a step; hold it until its bout is certain and the phone is not taken out."""
     at = s[CROSSED]
     spacing = at - s[LAST]
     over_gap = s[LAST] < s[FIRST]
-    if s[BOUT_STEPS] == 0.0 or spacing >= (BRIDGE if over_gap else s[MAX_SPACING]):
+    even = spacing <= s[EVEN] * s[PACE] and s[PACE] <= s[EVEN] * spacing
+    if s[UNSURE] > 1.0 and s[PACE] >= s[MAX_SPACING] and not even:
+        _keep_newest(s)
+    slow = spacing < s[SLOW_SPACING] and _slow(s, wide) and (even or s[PACE] == 0.0) and not over_gap
+    if s[BOUT_STEPS] == 0.0 or (spacing >= (BRIDGE if over_gap else s[MAX_SPACING]) and not slow):
         _drop_unsure(s)
         s[BOUT_STEPS] = spacing = 0.0
     elif over_gap:
         spacing = 0.0  # how many steps the gap hides is unknown
-    s[LAST] = at
+    s[LAST], s[PACE] = at, spacing
     s[BOUT_STEPS] += 1.0
     q = QUEUE + int(s[HEAD] + s[COUNT]) % int(s[CAPACITY]) * ENTRY
     s[q], s[q + 1], s[q + 2] = at, spacing, value
@@ -233,6 +251,17 @@ def _confirm(s: State, k: float, value: float, out: State, rows: int) -> int:
     s[COUNT] += 1.0
     s[UNSURE] = s[UNSURE] + 1.0 if s[BOUT_STEPS] < s[BOUT] else 0.0
     return _give_out(s, k, out, rows)
+
+
+def _keep_newest(s: State) -> None:
+    """Begin the bout with the newest step held: what lay a slow spacing before it did not go on at that pace."""
+    capacity = int(s[CAPACITY])
+    first, newest = int(s[HEAD] + s[COUNT] - s[UNSURE]), int(s[HEAD] + s[COUNT]) - 1
+    to, q = QUEUE + first % capacity * ENTRY, QUEUE + newest % capacity * ENTRY
+    s[to], s[to + 1], s[to + 2], s[to + 3] = s[q], 0.0, s[q + 2], s[q + 3]
+    s[COUNT] -= s[UNSURE] - 1.0
+    s[UNSURE] = s[BOUT_STEPS] = 1.0
+    s[PACE] = 0.0
 
 
 def _drop_unsure(s: State) -> None:
@@ -298,7 +327,7 @@ def _choose(s: State) -> None:
 
 def _clear_look_out(s: State) -> None:
     s[LOOKS] = 0.0
-    for i in range(SUMS, QUEUE):
+    for i in range(SUMS, SQUARES + 3):
         s[i] = 0.0
 
 

@@ -36,9 +36,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from service.counters.contract import choice, parameter
+from service.counters.contract import choice, ordered, parameter
 from service.counters.streaming import KernelCounter
 from service.counters.windowed_peak import Gait, Rules, counter
+from service.errors import ParameterError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +54,13 @@ class PlusMinusParams:
     longest_s: float = parameter(1.0, unit="s", low=0.3, high=3, text="most time between steps of one bout")
     bout: int = parameter(1, unit="peaks", low=1, high=12, text="peaks that make a bout certain")
     credit: str = choice("never", options=("never", "retrospective"), text="whether the peaks before that count")
+
+    def __post_init__(self) -> None:
+        """Check that some window can pass; ParameterError names what contradicts what."""
+        ordered(self, "shortest_s", "longest_s", equal=True)
+        if self.score_over >= 2 * self.half:
+            why = f"less than the {2 * self.half} points of a whole window, whose half is {self.half} pairs"
+            raise ParameterError("score_over", self.score_over, why)
 
 
 PAPER: Final = PlusMinusParams()

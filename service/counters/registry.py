@@ -1,4 +1,4 @@
-"""Every counter by name: its parameters, presets, the sensors it needs and how it is built.
+"""Every counter by name: its parameters, presets, calibrations, the sensors it needs and how it is built.
 
 A new counter is its own file and one line in `_KINDS`.
 """
@@ -19,7 +19,8 @@ from service.counters import (
     gyro_zero_crossing,
     plus_minus,
 )
-from service.counters.contract import StepCounter, with_overrides
+from service.counters.contract import StepCounter, lacking, with_overrides
+from service.counters.learning import MIDDLE, SLOWEST_WALK, WALK, Method
 from service.errors import CounterError
 from service.samples import Sensor
 
@@ -39,13 +40,34 @@ class CounterKind:
     presets: Mapping[str, Any]
     sensors: frozenset[Sensor]
     build: Callable[[Any], StepCounter]
+    calibrations: Mapping[str, Method]
+    """Ways to learn some of its parameters from a walk, by name."""
+
+    def calibration(self, name: str) -> Method:
+        """Return the method of that name; CounterError lists those it has."""
+        if name not in self.calibrations:
+            has = ", ".join(self.calibrations) or "none"
+            raise CounterError(f"{self.name} has no calibration {name!r}; it has {has}")
+        return self.calibrations[name]
 
 
 def _kind(
-    name: str, build: Callable[[Any], StepCounter], *, paper: object, tuned: object, sensors: frozenset[Sensor]
+    name: str,
+    build: Callable[[Any], StepCounter],
+    *,
+    paper: object,
+    tuned: object,
+    sensors: frozenset[Sensor],
+    calibrations: tuple[Method, ...] = (),
 ) -> CounterKind:
-    presets = MappingProxyType({"paper": paper, "tuned": tuned})
-    return CounterKind(name=name, params=type(paper), presets=presets, sensors=sensors, build=build)
+    return CounterKind(
+        name=name,
+        params=type(paper),
+        presets=MappingProxyType({"paper": paper, "tuned": tuned}),
+        sensors=sensors,
+        build=build,
+        calibrations=MappingProxyType({method.name: method for method in calibrations}),
+    )
 
 
 _KINDS: Final = (
@@ -55,6 +77,7 @@ _KINDS: Final = (
         paper=double_threshold.PAPER,
         tuned=double_threshold.TUNED,
         sensors=ACCELEROMETER,
+        calibrations=(WALK, MIDDLE),
     ),
     _kind(
         "autocorrelation",
@@ -69,6 +92,7 @@ _KINDS: Final = (
         paper=gyro_zero_crossing.PAPER,
         tuned=gyro_zero_crossing.TUNED,
         sensors=GYROSCOPE,
+        calibrations=(SLOWEST_WALK,),
     ),
     _kind("fusion", fusion.build, paper=fusion.PAPER, tuned=fusion.TUNED, sensors=frozenset(Sensor)),
     _kind(
@@ -106,6 +130,13 @@ def parameters(name: str, preset: str = "tuned", overrides: Mapping[str, object]
     return with_overrides(presets[preset], overrides or {})
 
 
+def require_sensors(name: str, sensors: Collection[Sensor] | None) -> None:
+    """Raise CounterError where a device with `sensors` lacks what the counter needs; None: nobody knows yet."""
+    why = None if sensors is None else lacking(name, kind(name).sensors, sensors)
+    if why is not None:
+        raise CounterError(why)
+
+
 def make(
     name: str,
     preset: str = "tuned",
@@ -113,9 +144,5 @@ def make(
     sensors: Collection[Sensor] | None = None,
 ) -> StepCounter:
     """Build a counter; where `sensors` says what the device has, CounterError names those that are missing."""
-    chosen = kind(name)
-    lacking = [] if sensors is None else sorted(chosen.sensors - frozenset(sensors))
-    if lacking:
-        has = ", ".join(sorted(sensors or ())) or "none"
-        raise CounterError(f"{name} needs {', '.join(lacking)}; the device has {has}")
-    return chosen.build(parameters(name, preset, overrides))
+    require_sensors(name, sensors)
+    return kind(name).build(parameters(name, preset, overrides))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
@@ -16,22 +17,28 @@ from numpy.typing import NDArray
 
 from service.counters.contract import Snapshot, check_snapshot, params_hash
 from service.errors import CounterError
-from service.samples import GRID_HZ, Band, Column, SampleBlock, Sensor, Step, Update
+from service.samples import GRID_HZ, Band, Column, Columns, Likely, SampleBlock, Sensor, Step, Update
 from service.signals.compiled import compiled
 
 COMPILED_FROM: Final = 2000
 """A block longer than this goes through the compiled kernel, if numba is there."""
 
-COMPILED_BLOCK: Final = 65_536
+COMPILED_BLOCK: Final = 8192
 """Samples the compiled kernel eats at once: buffers stay in the cache."""
 
+SAMPLES_A_ROW: Final = 12
+"""Seldom are there more rows: steps and windows come every 20 samples or so."""
+
 FIELDS: Final = {
-    Sensor.ACCELEROMETER: "acc_g",
-    Sensor.GYROSCOPE: "gyro_rad_s",
-    Sensor.MAGNETOMETER: "mag_ut",
+    Sensor.ACCELEROMETER: attrgetter("acc_g"),
+    Sensor.GYROSCOPE: attrgetter("gyro_rad_s"),
+    Sensor.MAGNETOMETER: attrgetter("mag_ut"),
 }
+"""A block's columns of a sensor."""
 
 Events = tuple[tuple[Step, ...], tuple[Band, ...]]
+
+NOTHING: Final[Events] = ((), ())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,22 +49,23 @@ class Kernel:
     `scan(*columns, n, s, out)` eats n samples, writes the filtered signal to `out[:n]` and rows after it, and returns
     where they end; it is compiled for whole recordings. `close(s, out)` ends the stretch (at a gap or the end), writes
     rows to `out[0:]` and returns where they end. `stop(s)` forgets what must not outlast the end of the stream.
-    `pending(s)` counts likely steps; `likely(s)`, where an algorithm can name them, gives the grid index (the filter's
-    delay not removed) and the strength of each. `s[next_index]` is the index of the sample to come, −1 before the first
-    stretch; `s[:constants]` never changes. A row is `row` floats; `delay` is by how many samples the filtered signal
-    lags.
+    `likely(s)` gives every peak that can still become a step: grid index (the filter's delay not removed), strength,
+    whether it passes what is in force.
+    `s[next_index]` is the index of the sample to come, −1 before the first stretch; `s[:constants]` never changes. A
+    row is `row` floats; `delay` is by how many samples the filtered signal lags, give or take
+    `time_error`.
     """
 
     begin: Callable[..., None]
     scan: Callable[..., int]
     close: Callable[[Any, Any], int]
     stop: Callable[[Any], None]
-    pending: Callable[[Any], int]
+    likely: Callable[[Any], list[Likely]]
     next_index: int
     constants: int
     row: int
     delay: float
-    likely: Callable[[Any], list[tuple[float, float]]] | None = None
+    time_error: float = 0.0
     sensors: tuple[Sensor, ...] = (Sensor.ACCELEROMETER,)
 
 
@@ -83,8 +91,12 @@ class KernelCounter:
         self.name = name
         self.params = params
         self.version = version
+        self.sensors = kernel.sensors
         self.latency_s = latency_s
+        self.time_error_s = kernel.time_error / GRID_HZ
         self._kernel = kernel
+        self._scan, self._named, self._next, self._delay = kernel.scan, kernel.likely, kernel.next_index, kernel.delay
+        self._sensors = [(sensor, FIELDS[sensor]) for sensor in kernel.sensors]
         self._state = state
         self._room_for = room
         self._events = events
@@ -93,26 +105,21 @@ class KernelCounter:
 
     def update(self, block: SampleBlock) -> Update:
         """Count on over `block`; ValueError where it overlaps, CounterError where a sensor is missing."""
-        kernel, n = self._kernel, len(block)
-        if n == 0:
-            return Update(pending=kernel.pending(self._state))
         columns = self._columns(block)
-        rows = [] if block.start == self._state[kernel.next_index] else self._open(block.start, columns)
+        n = len(columns[0])
+        if n == 0:
+            pending, likely = self._likely()
+            return Update(pending=pending, likely=likely)
+        rows = [] if block.start == self._state[self._next] else self._open(block.start, columns)
         if n > COMPILED_FROM:
-            arrays = self._scan_arrays(columns, n)
-            trace, found = arrays[0].tolist(), arrays[1].tolist()
+            signal, more = np.empty(n), _Rows(n, self._kernel.row)
+            self._scan_arrays(columns, n, more, signal)
+            trace, found = signal.tolist(), more.all().tolist()
         else:
             trace, found = self._scan_lists(columns, n)
-        steps, bands = self._events(rows + found) if rows or found else ((), ())
-        likely = self._likely()
-        return Update(
-            steps=steps,
-            pending=len(likely) if kernel.likely else kernel.pending(self._state),
-            likely=likely,
-            trace_from_s=(block.start - kernel.delay) / GRID_HZ,
-            trace=trace,
-            bands=bands,
-        )
+        steps, bands = self._events(rows + found) if rows or found else NOTHING
+        pending, likely = self._likely()
+        return Update(steps, pending, likely, (block.start - self._delay) / GRID_HZ, trace, bands)
 
     def finish(self) -> Update:
         """End the stream: what waits is decided with what is there."""
@@ -139,27 +146,35 @@ class KernelCounter:
             return np.empty((0, self._kernel.row))
         columns = self._columns(block)
         self._open(block.start, columns)
-        rows = np.concatenate([self._scan_arrays(columns, len(block))[1], self._close()])
+        rows = _Rows(len(block), self._kernel.row)
+        self._scan_arrays(columns, len(block), rows)
+        rows.add(np.array(self._close()))
         self._kernel.stop(self._state)
-        return rows.reshape(-1, self._kernel.row)
+        return rows.all().reshape(-1, self._kernel.row)
 
     def read(self, rows: NDArray[np.float64]) -> tuple[Step, ...]:
         """Return the steps that `count`'s rows say."""
         return self._events(rows.ravel().tolist())[0]
 
-    def _likely(self) -> list[tuple[float, float]]:
-        if self._kernel.likely is None:
-            return []
-        delay = self._kernel.delay
-        return [((index - delay) / GRID_HZ, strength) for index, strength in self._kernel.likely(self._state)]
+    def _likely(self) -> tuple[int, Sequence[Likely]]:
+        """Return how many steps are pending, and every one that may come, at its device time."""
+        found = self._named(self._state)
+        if not found:
+            return 0, ()
+        pending, delay = 0, self._delay
+        likely: list[Likely] = []
+        for index, strength, passes in found:
+            likely.append(((index - delay) / GRID_HZ, strength, passes))
+            pending += passes
+        return pending, likely
 
     def _columns(self, block: SampleBlock) -> tuple[Column, ...]:
         columns: tuple[Column, ...] = ()
-        for sensor in self._kernel.sensors:
-            found = getattr(block, FIELDS[sensor])
+        for sensor, columns_of in self._sensors:
+            found: Columns | None = columns_of(block)
             if found is None:
                 raise CounterError(f"{self.name} needs a {sensor.value}, and the device sends none")
-            columns += found
+            columns = columns + found if columns else found
         return columns
 
     def _open(self, start: int, columns: tuple[Column, ...]) -> list[float]:
@@ -179,25 +194,50 @@ class KernelCounter:
     def _scan_lists(self, columns: tuple[Column, ...], n: int) -> tuple[list[float], list[float]]:
         if n > self._room:
             self._room, self._out = n, [0.0] * self._room_for(n)
-        end = self._kernel.scan(*map(_as_list, columns), n, self._state, self._out)
-        return self._out[:n], self._out[n:end]
+        for column in columns:
+            if type(column) is not list:
+                columns = tuple(map(_as_list, columns))
+                break
+        out = self._out
+        end = self._scan(*columns, n, self._state, out)
+        return out[:n], out[n:end] if end > n else []
 
-    def _scan_arrays(self, columns: tuple[Column, ...], n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Feed the compiled kernel part by part; return the filtered signal and the rows, flat."""
+    def _scan_arrays(
+        self, columns: tuple[Column, ...], n: int, rows: _Rows, signal: NDArray[np.float64] | None = None
+    ) -> None:
+        """Feed the compiled kernel part by part; add to `rows`, and write the filtered signal where it is asked for."""
         arrays = [np.ascontiguousarray(column, dtype=np.float64) for column in columns]
         state = np.array(self._state)
         out = np.empty(self._room_for(COMPILED_BLOCK))
-        trace = np.empty(n)
-        rows: list[NDArray[np.float64]] = []
         scan = compiled(self._kernel.scan)
         for first in range(0, n, COMPILED_BLOCK):
-            parts = [array[first : first + COMPILED_BLOCK] for array in arrays]
-            m = len(parts[0])
-            end = scan(*parts, m, state, out)
-            trace[first : first + m] = out[:m]
-            rows.append(out[m:end].copy())
+            last = min(first + COMPILED_BLOCK, n)
+            m = last - first
+            end = scan(*[array[first:last] for array in arrays], m, state, out)
+            if signal is not None:
+                signal[first:last] = out[:m]
+            rows.add(out[m:end])
         self._state = state.tolist()
-        return trace, np.concatenate(rows)
+
+
+class _Rows:
+    """Rows of a recording of `samples`, flat, in one array that seldom grows: fresh memory costs more than a kernel."""
+
+    __slots__ = ("_array", "_end")
+
+    def __init__(self, samples: int, row: int) -> None:
+        self._array = np.empty((samples // SAMPLES_A_ROW + 1) * row)
+        self._end = 0
+
+    def add(self, values: NDArray[np.float64]) -> None:
+        end = self._end + len(values)
+        if end > len(self._array):
+            self._array = np.concatenate([self._array, np.empty(end)])
+        self._array[self._end : end] = values
+        self._end = end
+
+    def all(self) -> NDArray[np.float64]:
+        return self._array[: self._end]
 
 
 def _as_list(column: Column) -> list[float]:

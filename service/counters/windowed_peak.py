@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from service.counters import windowed_peak_kernel as kernel
+from service.counters.contract import ordered
 from service.counters.streaming import Kernel, KernelCounter
+from service.errors import ParameterError
 from service.samples import GRID_HZ, Band, Step
 
 LONGEST_SMOOTHING: Final = 5
@@ -21,7 +23,6 @@ _KERNEL: Final = Kernel(
     scan=kernel.scan,
     close=kernel.close,
     stop=kernel.stop,
-    pending=kernel.pending,
     likely=kernel.likely,
     next_index=kernel.NEXT,
     constants=kernel.CONSTANTS,
@@ -76,6 +77,18 @@ class Rules:
         if self.credit == "retrospective":
             wait += (self.bout - 1) * max(_samples(gait.longest_s) for gait in gaits)
         return wait / GRID_HZ
+
+
+def check_spacing(params: object, gait: str = "") -> None:
+    """Raise ParameterError where no two peaks of a gait can follow each other; its parameters' names begin with `gait`.
+
+    Of two peaks nearer than `half` only one is the greatest of its neighbourhood.
+    """
+    ordered(params, f"{gait}shortest_s", f"{gait}longest_s", equal=True)
+    longest_s, half = getattr(params, f"{gait}longest_s"), getattr(params, f"{gait}half")
+    if _samples(longest_s) <= half:
+        why = f"more than {gait}half, which is {half} samples ({half / GRID_HZ:g} s): no two peaks lie nearer"
+        raise ParameterError(f"{gait}longest_s", longest_s, why)
 
 
 def counter(name: str, params: object, rules: Rules) -> KernelCounter:

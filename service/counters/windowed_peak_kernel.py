@@ -16,6 +16,8 @@ from collections.abc import MutableSequence, Sequence
 from math import sqrt
 from typing import Final
 
+from service.samples import Likely
+
 # Constants of an instance.
 WEIGHTS: Final = 0  # five, of the newest sample and the four before
 RULE: Final = 5
@@ -111,7 +113,8 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
         a, b, c = x[i], y[i], z[i]
         m = sqrt(a * a + b * b + c * c)
         value = w0 * m + w1 * m1 + w2 * m2 + w3 * m3 + w4 * m4
-        m1, m2, m3, m4 = m, m1, m2, m3
+        m4, m3, m2 = m3, m2, m1
+        m1 = m
         out[i] = value
         s[place] = value
         place += 1
@@ -147,30 +150,45 @@ def stop(s: State) -> None:
     s[PEAKS] = 0.0
 
 
-def pending(s: State) -> int:
-    """Return how many peaks are likely to become steps."""
-    return len(likely(s))
+def likely(s: State) -> list[Likely]:
+    """Return every peak that can still become a step: index, height, and whether it passes what is in force.
 
-
-def likely(s: State) -> list[tuple[float, float]]:
-    """Return index and height of the peaks that are likely to become steps.
-
-    Those are the held ones of a bout that is not certain yet, and waiting tops that are not too near the last one.
+    Those are the held ones of a bout that can still become certain, and the waiting tops that no rule excludes yet.
+    One passes if the samples before it are enough lower and no other that passes lies too near before it.
     """
-    found: list[tuple[float, float]] = []
+    found: list[Likely] = []
     peaks, last, credit = s[PEAKS], s[LAST], s[CREDIT] > 0.0
-    if credit and 0.0 < peaks < s[BOUT] and s[NEXT] - last <= max(s[WALK + LONGEST], s[RUN + LONGEST]):
-        found += [(s[row], s[row + 2] - s[row + 3]) for row in range(HELD, HELD + int(peaks) * ROW, ROW)]
-    if s[COUNT] == 0.0:
-        return found
+    longest = max(s[WALK + LONGEST], s[RUN + LONGEST])
+    crest = s[RISE_AT] >= max(0.0, s[NEXT] - LONGEST_WINDOW)  # flat up to now
+    goes_on = s[NEXT] - last <= longest or (crest and s[RISE_AT] <= last + longest)
+    passed, rank = last if peaks > 0.0 else -longest, s[BOUT] if credit else peaks
     for q in range(QUEUE, QUEUE + int(s[COUNT]) * ENTRY, ENTRY):
-        spacing, gait = s[q + AT] - last, _gait(s, s[q + VALUE])
-        if peaks > 0.0 and spacing < s[gait + SHORTEST]:
+        at, value = s[q + AT], s[q + VALUE]
+        gait = _gait(s, value)
+        spacing = at - last
+        if (peaks > 0.0 and spacing < s[gait + SHORTEST]) or _fails(s, q, gait):
             continue
+        rank += 1.0
+        if rank < s[BOUT]:
+            continue  # a reference at most
+        goes_on = goes_on or spacing <= longest
         in_bout = 1.0 if peaks == 0.0 or spacing > s[gait + LONGEST] else peaks + 1.0
-        if credit or in_bout >= s[BOUT]:
-            found.append((s[q + AT], s[q + VALUE] - s[q + LOW]))
+        passes = value - s[q + LOW] >= s[REST] and at - passed >= s[gait + SHORTEST]
+        if passes:
+            passed = at
+        found.append((at, value - s[q + LOW], passes and (credit or in_bout >= s[BOUT])))
+    if goes_on and credit and 0.0 < peaks < s[BOUT]:
+        end = HELD + int(peaks) * ROW
+        return [(s[row], s[row + 2] - s[row + 3], True) for row in range(HELD, end, ROW)] + found
     return found
+
+
+def _fails(s: State, q: int, gait: int) -> bool:
+    """Tell whether the top at queue place `q` can pass no more, whatever comes."""
+    if s[RULE] == SCORE:
+        falls = s[FALLS] + s[q + JUDGE_AT] - s[NEXT] + 1.0
+        return not s[q + POINTS] + 2.0 * falls - s[gait + HALF] > s[SCORE_OVER]
+    return s[SMOOTHED] > s[q + VALUE]
 
 
 def _gait(s: State, value: float) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,12 +19,14 @@ ALL: Final = "all"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """A file to evaluate: its path as it was asked for (`shown`) and as it is, its folder's name, its columns."""
+    """A file to evaluate: its path as asked for (`shown`) and as it is, its folder's name, and how to read it."""
 
     shown: str
     path: Path
     dataset: str
     mapping: ColumnMapping | None = None
+    rate_hz: float | None = None
+    """Where the file does not say its own."""
 
 
 def choices(counters: Sequence[str], preset: str, params: Sequence[str]) -> list[Choice]:
@@ -62,35 +65,43 @@ def counters_and_paths(words: Sequence[str], paths: Sequence[str]) -> tuple[list
     return names or [registry.DEFAULT], [*paths, *(word for word in words if word not in names)]
 
 
-def find(paths: Sequence[str], mapping: ColumnMapping | None = None) -> tuple[list[Found], list[str]]:
+def find(
+    paths: Sequence[str], mapping: ColumnMapping | None = None, rate_hz: float | None = None
+) -> tuple[list[Found], list[str]]:
     """Return the recordings at `paths`, folders searched through, and what was passed over in them.
 
-    With a `mapping`, every text is read as a table of those columns.
+    Each file is found once, by the first path to it. With a `mapping`, every text is read as a table of those columns.
 
     Passed over are hidden files and texts that are no recording; a file named by itself never is. ParameterError where
     a path does not exist or there is no recording at all.
     """
     if not paths:
         raise ParameterError("PATH", "", "name a recording or a folder of recordings")
-    found: list[Found] = []
+    found: dict[Path, Found] = {}
     passed: list[str] = []
+
+    def add(shown: str, path: Path) -> None:
+        place = _place(path)
+        dataset = place.parent.name
+        found.setdefault(place, Found(shown=shown, path=path, dataset=dataset, mapping=mapping, rate_hz=rate_hz))
+
     for text in dict.fromkeys(paths):
         path = Path(text)
         if not path.exists():
             raise ParameterError("PATH", text, "no such file or folder")
         if not path.is_dir():
-            found.append(_found(text, path, mapping))
+            add(text, path)
             continue
         for file in _files(path):
             shown = f"{text.rstrip('/') or '/'}/{file.relative_to(path).as_posix()}"
             if is_recording(file, mapping):
-                found.append(_found(shown, file, mapping))
+                add(shown, file)
             else:
                 passed.append(shown)
     if not found:
         why = f"no recordings ({', '.join(sorted(suffixes()))}) there"
         raise ParameterError("PATH", " ".join(paths), f"{why}; {len(passed)} texts are none" if passed else why)
-    return found, passed
+    return list(found.values()), list(dict.fromkeys(passed))
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -100,5 +111,6 @@ def _files(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _found(shown: str, path: Path, mapping: ColumnMapping | None) -> Found:
-    return Found(shown=shown, path=path, dataset=path.resolve().parent.name, mapping=mapping)
+def _place(path: Path) -> Path:
+    """Return where `path` lies; a link is where it was put, whatever it leads to."""
+    return Path(os.path.normpath(path.absolute()))

@@ -21,12 +21,9 @@ from service.counters.streaming import COMPILED_FROM, KernelCounter
 from service.errors import RecordingError
 from service.recordings import Recording, evenly_spaced, stated_rate_hz
 from service.recordings.recording import Floats, median_rate_hz
-from service.samples import Columns, RawBlock, SampleBlock, Sensor, Step
+from service.samples import MIN_RATE_HZ, Columns, RawBlock, SampleBlock, Sensor, Step
 from service.signals.compiled import available
 from service.signals.timebase import Timebase
-
-MIN_RATE_HZ: Final = 10.0
-"""A run has up to 4 steps a second, and its second harmonic tells the feet apart: less is no signal to count."""
 
 WARM_UP_SAMPLES: Final = 64
 """Enough to make numba compile every kernel of a counter."""
@@ -125,7 +122,7 @@ _compiled: set[tuple[str, str]] = set()
 def _compile_once(made: KernelCounter, block: SampleBlock, spare: StepCounter) -> None:
     key = (made.name, params_hash(made.params))
     if key not in _compiled and isinstance(spare, KernelCounter):
-        spare.count(_part(block, 0, WARM_UP_SAMPLES, as_lists=False))
+        spare.count(part(block, 0, WARM_UP_SAMPLES, as_lists=False))
         _compiled.add(key)
 
 
@@ -137,10 +134,12 @@ def streamed(counter: StepCounter, parts: Iterable[SampleBlock]) -> list[Step]:
 
 def pieces(block: SampleBlock, samples: int = COMPILED_FROM) -> list[SampleBlock]:
     """Cut `block` into lists of `samples`, short enough to go through plain Python."""
-    return [_part(block, first, first + samples, as_lists=True) for first in range(0, len(block), samples)]
+    return [part(block, first, first + samples, as_lists=True) for first in range(0, len(block), samples)]
 
 
-def _part(block: SampleBlock, first: int, last: int, *, as_lists: bool) -> SampleBlock:
+def part(block: SampleBlock, first: int, last: int, *, as_lists: bool) -> SampleBlock:
+    """Return samples `first` to `last`, the latter left out, of all sensors of `block`."""
+
     def cut(columns: Columns | None) -> Columns | None:
         if columns is None:
             return None

@@ -134,15 +134,18 @@ class Score:
 class Summary:
     """Results of several recordings; a figure is None where no recording has what it needs.
 
-    `true` and `counted` sum the recordings whose true number is known. Percentages concern those that hold steps:
-    `accuracy` and `mape` are means over recordings, `pooled_accuracy` is 1 − Σ|error|/Σtrue, `bias` is Σerror/Σtrue.
-    `false_per_hour` concerns those that hold none. Precision, recall and both F1 are of all steps together.
+    `true`, `counted` and `error` sum the recordings that hold steps, and so do the percentages: `accuracy` and `mape`
+    are means over recordings, `pooled_accuracy` is 1 − Σ|error|/Σtrue, `bias` is Σerror/Σtrue. `false` are the steps
+    counted where there are none, `untold` those counted where the true number is unknown. Precision, recall and both F1
+    are of all steps together.
     """
 
     recordings: int
     hours: float
-    true: int
-    counted: int
+    true: int | None
+    counted: int | None
+    false: int | None
+    untold: int | None
     accuracy: float | None
     pooled_accuracy: float | None
     mape: float | None
@@ -154,9 +157,9 @@ class Summary:
     blind_f1: float | None
 
     @property
-    def error(self) -> int:
+    def error(self) -> int | None:
         """Counted minus true steps."""
-        return self.counted - self.true
+        return None if self.counted is None or self.true is None else self.counted - self.true
 
 
 def summarise(scores: Iterable[Score]) -> Summary:
@@ -165,32 +168,38 @@ def summarise(scores: Iterable[Score]) -> Summary:
     >>> walk = Score(counted=90, true=100, duration_s=60.0)
     >>> desk = Score(counted=6, true=0, duration_s=1800.0)
     >>> s = summarise([walk, desk])
-    >>> s.error, s.accuracy, s.mape, s.bias, s.false_per_hour
-    (-4, 90.0, 10.0, -10.0, 12.0)
+    >>> s.error, s.accuracy, s.mape, s.bias, s.false, s.false_per_hour
+    (-10, 90.0, 10.0, -10.0, 6, 12.0)
     """
     scores = list(scores)
-    known = [(s.counted, s.true) for s in scores if s.true is not None]
-    walks = [(counted, true) for counted, true in known if true > 0]
+    walks = [(s.counted, s.true) for s in scores if s.true]
     rests = [s for s in scores if s.true == 0]
     true, rest_s = sum(true for _, true in walks), sum(s.duration_s for s in rests)
+    counted = sum(counted for counted, _ in walks)
     mape = _mean([error_percent(counted, true) for counted, true in walks])
     off = sum(abs(counted - true) for counted, true in walks)
     matched, blind = (_together([getattr(s, which) for s in scores]) for which in ("matches", "blind"))
     return Summary(
         recordings=len(scores),
         hours=sum(s.duration_s for s in scores) / SECONDS_PER_HOUR,
-        true=true,
-        counted=sum(counted for counted, _ in known),
+        true=true if walks else None,
+        counted=counted if walks else None,
+        false=_total([s.counted for s in rests]),
+        untold=_total([s.counted for s in scores if s.true is None]),
         accuracy=None if mape is None else 100.0 - mape,
         pooled_accuracy=100.0 - 100.0 * off / true if walks else None,
         mape=mape,
-        bias=100.0 * sum(counted - true for counted, true in walks) / true if walks else None,
+        bias=100.0 * (counted - true) / true if walks else None,
         false_per_hour=sum(s.counted for s in rests) * SECONDS_PER_HOUR / rest_s if rest_s else None,
         precision=matched.precision,
         recall=matched.recall,
         f1=matched.f1,
         blind_f1=blind.f1,
     )
+
+
+def _total(counts: Sequence[int]) -> int | None:
+    return sum(counts) if counts else None
 
 
 def _mean(values: Sequence[float]) -> float | None:

@@ -12,11 +12,16 @@ from service.evaluation.metrics import Matches, Score
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """A counter to evaluate: its name, a preset and what differs from it."""
+    """A counter to evaluate: its name, a preset and what differs from it.
+
+    `from_middle` lets it learn from each recording; `calibration` says what it has learnt, None where nothing.
+    """
 
     counter: str
     preset: str
     overrides: Mapping[str, object]
+    from_middle: bool = False
+    calibration: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,8 +30,9 @@ class Row:
 
     `path` is as it was asked for, `dataset` the folder the file lies in. `true_steps` is None where unknown, `steps`
     where `error` says why there are none; `samples` are those of the 50 Hz grid. `tp`, `fp`, `fn` are None where step
-    times are unknown. `blind`, `saturated` and `changed` (parameters that differ from the preset's) are for the
-    tables only.
+    times are unknown. `saturated` tells whether the sensor was at its limit, None where the file could not be read;
+    `calibration` what the counter learnt, None where nothing: `params` hold it. For the tables only are `blind`,
+    `uncalibrated` (it was to learn and found no walk) and `changed` (parameters that were asked for).
     """
 
     path: str
@@ -45,7 +51,9 @@ class Row:
     elapsed_s: float | None = None
     matches: Matches | None = None
     blind: Matches | None = None
-    saturated: bool = False
+    saturated: bool | None = None
+    calibration: str | None = None
+    uncalibrated: bool = False
     changed: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
@@ -69,6 +77,7 @@ class Row:
 
 _PLAIN: Final = (
     "path", "dataset", "placement", "activity", "rate_hz", "counter", "preset", "params", "true_steps", "steps",
-    "error", "duration_s", "samples", "elapsed_s",
+    "error", "duration_s", "samples", "elapsed_s", "saturated",
+    "calibration",
 )  # fmt: skip
 """Keys of a row in JSON, in their order; `tp`, `fp`, `fn` follow."""

@@ -13,24 +13,17 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from dataclasses import asdict, replace
-from typing import Final
-
-import numpy as np
 
 from service.counters import registry
 from service.errors import SteplinkError
+from service.evaluation.calibration import taught
 from service.evaluation.choices import Found
 from service.evaluation.counting import count, grid_block
 from service.evaluation.metrics import Times, match, metronome_s
 from service.evaluation.rows import Choice, Row
+from service.evaluation.saturation import saturated
 from service.recordings import Recording, read
 from service.samples import SampleBlock
-
-PLATEAU_SAMPLES: Final = 3
-"""Equal samples in a row at the largest value of a recording: the sensor's range ended there."""
-
-PLATEAU_FROM_G: Final = 1.4
-"""A coarse sensor at rest repeats itself at 1 g; no sensor's range ends below 1.5 g."""
 
 Progress = Callable[[int, int], None]
 """Is told how many recordings are done, and of how many."""
@@ -61,6 +54,7 @@ async def evaluate(
         with _ctrl_c_ignored():
             futures = [pool.submit(rows_of, file, chosen, lsb_per_g) for file in found]
         by_file = await asyncio.gather(*(rows(file, future) for file, future in zip(found, futures, strict=True)))
+        pool.shutdown()  # waited for: a pool that is still ending when Python ends may fail there
         return [row for made in by_file for row in made]
     except asyncio.CancelledError:
         for process in multiprocessing.active_children():
@@ -83,11 +77,11 @@ def _ctrl_c_ignored() -> Iterator[None]:
 def rows_of(file: Found, chosen: Sequence[Choice], lsb_per_g: float) -> list[Row]:
     """Read one recording and count it with each counter."""
     try:
-        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping)
+        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping, rate_hz=file.rate_hz)
         block = grid_block(recording)
     except Exception as error:  # one recording must not end the others
         return failed_rows(file, chosen, _told(error))
-    return [_row(file, recording, block, choice) for choice in chosen]
+    return [_row(file, recording, block, taught(choice, block), asked=choice) for choice in chosen]
 
 
 def failed_rows(file: Found, chosen: Sequence[Choice], error: str) -> list[Row]:
@@ -106,7 +100,7 @@ def failed_rows(file: Found, chosen: Sequence[Choice], error: str) -> list[Row]:
     ]
 
 
-def _row(file: Found, recording: Recording, block: SampleBlock, choice: Choice) -> Row:
+def _row(file: Found, recording: Recording, block: SampleBlock, choice: Choice, *, asked: Choice) -> Row:
     true_s = None if recording.step_t_s is None else recording.step_t_s - recording.t_s[0]
     true = len(true_s) if recording.true_steps is None and true_s is not None else recording.true_steps
     row = Row(
@@ -115,7 +109,9 @@ def _row(file: Found, recording: Recording, block: SampleBlock, choice: Choice) 
         counter=choice.counter,
         preset=choice.preset,
         params=_params(choice),
-        changed=tuple(choice.overrides),
+        changed=tuple(asked.overrides),
+        calibration=choice.calibration,
+        uncalibrated=choice.from_middle and choice.calibration is None,
         placement=recording.placement,
         activity=recording.activity,
         rate_hz=recording.rate_hz,
@@ -138,17 +134,6 @@ def _counted(row: Row, block: SampleBlock, choice: Choice, true_s: Times | None)
         return row
     blind = match(metronome_s(counted.steps, true_s), true_s)
     return replace(row, matches=match(counted.step_t_s, true_s), blind=blind)
-
-
-def saturated(recording: Recording) -> bool:
-    """Tell whether the sensor's range ended below what it felt: a plateau at the recording's largest value."""
-    size_g = np.abs(recording.acc_g)
-    top_g = size_g.max()
-    at_top = size_g == top_g
-    together = at_top[PLATEAU_SAMPLES - 1 :].copy()
-    for before in range(1, PLATEAU_SAMPLES):
-        together &= at_top[PLATEAU_SAMPLES - 1 - before : len(at_top) - before]
-    return bool(top_g >= PLATEAU_FROM_G and together.any())
 
 
 def _params(choice: Choice) -> dict[str, object]:

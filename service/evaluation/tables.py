@@ -18,13 +18,14 @@ ERRORS_SHOWN: Final = 10
 UNKNOWN: Final = "–"
 
 LEGEND: Final = """\
-rec. recordings; error = steps − true; accuracy = 1 − |error|/true, the mean over recordings that hold steps, and
-pooled (all their steps together); MAPE = 100 − accuracy; bias = Σerror/Σtrue; false/h: steps an hour where there are
-none; precision, recall, F1 at ±0.15 s where step times are known; blind: F1 of as many evenly spread steps."""
+rec. recordings; true, steps, error = steps − true: of those that hold steps; false: steps counted where there are none,
+false/h: an hour; untold: steps counted where the true number is unknown (beside others whose is known). accuracy =
+1 − |error|/true, the mean over recordings, and pooled (all their steps together); MAPE = 100 − accuracy; bias =
+Σerror/Σtrue; precision, recall, F1 at ±0.15 s where step times are known; blind: F1 of as many evenly spread steps."""
 
 COLUMNS: Final = (
-    "counter", "rec.", "hours", "true", "steps", "error", "accuracy %", "pooled %", "MAPE %", "bias %", "false/h",
-    "precision", "recall", "F1", "blind",
+    "counter", "rec.", "hours", "true", "steps", "error", "accuracy %", "pooled %", "MAPE %", "bias %", "false",
+    "false/h", "untold", "precision", "recall", "F1", "blind",
 )  # fmt: skip
 
 
@@ -72,10 +73,11 @@ def aligned(lines: Sequence[Sequence[str]], *, left: int) -> str:
     return "\n".join([texts[0], "─" * max(map(len, texts)), *texts[1:]])
 
 
-def _asked(rows: Iterable[Row]) -> str:
+def _asked(rows: Sequence[Row]) -> str:
     """Say with which parameters: the preset, and what was changed of it."""
     changed = {f"{row.counter}.{key}={row.params[key]}" for row in rows for key in row.changed}
-    return " ".join([f"preset {' '.join(sorted({row.preset for row in rows}))}", *sorted(changed)])
+    taught = ["calibrated"] if any(row.calibration for row in rows) else []
+    return " ".join([f"preset {' '.join(sorted({row.preset for row in rows}))}", *taught, *sorted(changed)])
 
 
 def _groupings(rows: Sequence[Row]) -> Iterator[tuple[str, Callable[[Row], str]]]:
@@ -91,18 +93,21 @@ def _groupings(rows: Sequence[Row]) -> Iterator[tuple[str, Callable[[Row], str]]
 
 
 def _cells(of: Summary) -> list[str]:
-    unknown = of.accuracy is None and of.false_per_hour is None
+    # Where no true number is known, the count is what was asked for.
+    nothing_known = of.counted is None and of.false is None
     return [
         str(of.recordings),
         f"{of.hours:.2f}",
-        UNKNOWN if unknown else str(of.true),
-        UNKNOWN if unknown else str(of.counted),
-        UNKNOWN if unknown else f"{of.error:+d}",
+        UNKNOWN if nothing_known else _figure(of.true, "d"),
+        _figure(of.untold if nothing_known else of.counted, "d"),
+        UNKNOWN if nothing_known else _figure(of.error, "+d"),
         _figure(of.accuracy, ".2f"),
         _figure(of.pooled_accuracy, ".2f"),
         _figure(of.mape, ".1f"),
         _figure(of.bias, "+.1f"),
+        _figure(of.false, "d"),
         _figure(of.false_per_hour, ".0f"),
+        "" if nothing_known else _figure(of.untold, "d"),
         *(_figure(value, ".3f") for value in (of.precision, of.recall, of.f1, of.blind_f1)),
     ]
 
@@ -112,17 +117,18 @@ def _figure(value: float | None, form: str) -> str:
 
 
 def _notes(rows: Iterable[Row]) -> list[str]:
-    """Say what the tables cannot: whose truth is unknown, and whose sensor was at its end."""
+    """Say what the tables cannot: whose sensor was at its end, and where the counts of unknown truth are."""
     rows = list(rows)
-    paths = {row.path for row in rows if row.saturated}
+    at_end = sorted({row.path for row in rows if row.saturated})
+    unknown, listed = {row.path for row in rows if row.true_steps is None}, {row.path for row in rows}
     notes = []
-    if paths:
-        notes.append(f"saturated (flat at the largest value, steps may be missing): {_some(sorted(paths))}")
-    unknown = [row for row in rows if row.true_steps is None]
-    if unknown:
-        counts = "\n".join(f"  {row.path}: {row.steps} ({row.counter})" for row in unknown[:EACH_RECORDING_UP_TO])
-        more = f"\n  … {len(unknown) - EACH_RECORDING_UP_TO} more" if len(unknown) > EACH_RECORDING_UP_TO else ""
-        notes.append(f"counted where the true number is unknown:\n{counts}{more}")
+    if at_end:
+        notes.append(f"saturated (samples pile up at the largest value, steps may be missing): {_some(at_end)}")
+    untaught = sorted({row.path for row in rows if row.uncalibrated})
+    if untaught:
+        notes.append(f"not calibrated (no walk in the middle of it): {_some(untaught)}")
+    if unknown and len(listed) > EACH_RECORDING_UP_TO:
+        notes.append(f"the true number is unknown for {len(unknown)} recordings; --json FILE has the count of each")
     return notes
 
 

@@ -7,13 +7,17 @@ import logging
 import time
 from collections.abc import Callable
 
-from service.errors import LinkError
+from service.counters import registry
+from service.errors import CounterError, LinkError, NotNowError
 from service.links.ble import Sighting
 from service.links.contract import Link
+from service.pipeline.calibration import Calibration, Plan
+from service.pipeline.calibrations import Calibrations
 from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State, advance, backoff_s
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Publish, Session
+from service.tracking.fitness import why_not
 from service.tracking.tracker import Tracker
 from service.wearables.contract import Wearable
 
@@ -31,6 +35,7 @@ class Device:
         self.lineup = lineup
         tracker = Tracker(wearable, lineup.makers, primary=lineup.primary)
         self.session = Session(lambda: self.id, tracker, publish)
+        self.calibrations = Calibrations(self.session)
         self.state = State.SEEN
         self.reason: str | None = None
         self.since_ns = time.time_ns()
@@ -52,9 +57,23 @@ class Device:
         return self.wanted and self.state in WAITING and time.monotonic() >= self.not_before_s
 
     def count_with(self, lineup: Lineup) -> None:
-        """Go on with these counters."""
-        self.lineup = lineup
+        """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
+        registry.require_sensors(lineup.primary, self.session.tracker.info.sensors)
         self.session.change_counters(lineup)
+        self.lineup = lineup
+
+    def require_streaming(self) -> None:
+        """Raise NotNowError unless the device streams."""
+        if self.state is not State.STREAMING:
+            raise NotNowError(f"{self.id} is {self.state.value}: connect it first, then begin")
+
+    def calibrate(self, plan: Plan) -> Calibration:
+        """Begin a calibration; NotNowError where it cannot be now, CounterError where the counter cannot count it."""
+        self.require_streaming()
+        name = plan.choice.name
+        if (why := why_not(name, registry.kind(name).sensors, self.session.tracker.stream)) is not None:
+            raise CounterError(why)
+        return self.calibrations.begin(plan)
 
     def heard(self, sighting: Sighting, *, tell_every_s: float) -> None:
         """Take an advertisement."""

@@ -44,6 +44,18 @@ class Lineup:
         """Name of the counter whose count is the device's."""
         return self.choices[0].name
 
+    def choice(self, name: str) -> CounterChoice:
+        """Return how that counter runs, or would: with the primary's preset where it does not run yet."""
+        return self.makers.get(name) or CounterChoice(name=name, preset=self.choices[0].preset)
+
+    def taught(self, name: str, params: Mapping[str, object]) -> Lineup:
+        """Return the lineup in which that counter goes on with `params` changed, and runs beside if it did not run."""
+        known = self.choice(name)
+        changed = CounterChoice(name=name, preset=known.preset, overrides={**known.overrides, **params})
+        if name not in self.makers:
+            return Lineup(choices=(*self.choices, changed))
+        return Lineup(choices=tuple(changed if choice.name == name else choice for choice in self.choices))
+
     @property
     def makers(self) -> dict[str, CounterChoice]:
         """What makes each counter, by name."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from service.pipeline.lifecycle import State
-from service.samples import Counting, Described, Event, Signal, Tentative
+from service.samples import Counting, Described, Event, Gridded, Signal, Tentative
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +27,7 @@ EPHEMERAL = (Signal, Counting, Described, DeviceChanged)
 """Events of which only the newest matters: no ordinal, conflated for slow readers."""
 
 
-UNNUMBERED = (*EPHEMERAL, Tentative)
+UNNUMBERED = (*EPHEMERAL, Tentative, Gridded)
 """Events without an ordinal, that no log keeps; a Tentative is queued like a durable one, for a retraction is news."""
 
 

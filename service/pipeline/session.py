@@ -6,6 +6,7 @@ Steps and events are kept in memory, the newest LOG_NOTICES of them.
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections import deque
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from service.links.contract import Link
 from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told
-from service.samples import Described, Event, Gap, Packet, Rebooted, StepCounted, Tentative
+from service.samples import Described, Event, Gap, Gridded, Packet, Rebooted, StepCounted, Tentative
 from service.signals.hosttime import HostClock
 from service.tracking.tracker import Tracker
 
@@ -28,6 +29,8 @@ TELL_EVERY_NS = 1_000_000_000
 
 Publish = Callable[[Notice], None]
 
+logger = logging.getLogger(__name__)
+
 
 class Session:
     """One device's counting, over any number of links. `name_device` gives its id, `publish` takes each notice."""
@@ -37,10 +40,14 @@ class Session:
         self.tracker = tracker
         self.since_ns = time.time_ns()
         self.log: deque[Notice] = deque(maxlen=LOG_NOTICES)
+        self.observers: list[Publish] = []
+        """Told of everything at once and in order, of the grid samples too; they do not wait and do not raise."""
         self._publish = publish
         self._clock = HostClock()
         self._ordinal = 0
         self._told_ns = 0
+        self._faults: dict[str, str] = {}
+        self._warned: set[str] = set()
 
     async def follow(self, link: Link) -> None:
         """Take the link's packets until it is lost (LinkError) or the task is cancelled."""
@@ -54,13 +61,16 @@ class Session:
     def apply(self, packet: Packet) -> None:
         """Take one packet, from any link."""
         samples = self.tracker.tally.samples
-        events = self.tracker.apply(packet)
+        events, clock = self.tracker.apply(packet), self._clock
         if any(isinstance(event, Rebooted) for event in events):
             self._clock = HostClock()
         if self.tracker.tally.samples != samples:
             self._clock.arrived(self.tracker.now_s, packet.at_ns)
         for event in events:
-            self.tell(event, self._host_ns(event))
+            if isinstance(event, Rebooted):  # what came before it happened in the other boot's device time
+                clock = self._clock
+            self.tell(event, self._host_ns(event, clock))
+        self._tell_faults()
         if abs(packet.at_ns - self._told_ns) >= TELL_EVERY_NS:
             self._told_ns = packet.at_ns
             self.tell(DeviceChanged(), packet.at_ns)
@@ -68,15 +78,19 @@ class Session:
     def change_counters(self, lineup: Lineup) -> None:
         """Go on with other counters, and tell what that decided."""
         for event in self.tracker.change_counters(lineup.makers, primary=lineup.primary):
-            self.tell(event, self._host_ns(event))
+            self.tell(event, self._host_ns(event, self._clock))
         self.tell(DeviceChanged(), time.time_ns())
+        self._tell_faults()
 
     def state_changed(self, state: State, reason: str | None) -> None:
         """Tell that the device's connection came into another state."""
         self.tell(StateChanged(state=state, reason=reason), time.time_ns())
 
     def tell(self, event: Told, at_ns: int) -> None:
-        """Publish an event, and keep it if it is durable."""
+        """Tell the observers, publish the event unless it is for them only, and keep it if it is durable."""
+        private = isinstance(event, Gridded)
+        if private and not self.observers:
+            return
         if isinstance(event, Described):
             event = DeviceChanged()
         ordinal = None
@@ -90,21 +104,36 @@ class Session:
             ordinal=ordinal,
             event=event,
         )
+        for observe in tuple(self.observers):
+            observe(notice)
         if ordinal is not None:
             self.log.append(notice)
-        self._publish(notice)
+        if not private:
+            self._publish(notice)
 
     def steps(self) -> list[Notice]:
         """Return the steps kept, in the order they were confirmed."""
         return [notice for notice in self.log if isinstance(notice.event, StepCounted)]
 
-    def _host_ns(self, event: Event) -> int:
+    def _tell_faults(self) -> None:
+        """Tell at once that a counter cannot count, or can again; say on the log why, once a session."""
+        faults = self.tracker.counter_faults
+        if faults == self._faults:
+            return
+        self._faults = dict(faults)
+        self.tell(DeviceChanged(), time.time_ns())
+        for why in faults.values():
+            if why not in self._warned:
+                self._warned.add(why)
+                logger.warning("%s: not counted: %s", self._name_device(), why)
+
+    def _host_ns(self, event: Event, clock: HostClock) -> int:
         match event:
             case StepCounted():
-                return self._clock.at_ns(event.step.at_s)
+                return clock.at_ns(event.step.at_s)
             case Tentative():
-                return self._clock.at_ns(event.at_s)
+                return clock.at_ns(event.at_s)
             case Gap():
-                return self._clock.at_ns(event.to_s)
+                return clock.at_ns(event.to_s)
             case _:
-                return self._clock.at_ns(self.tracker.now_s)
+                return clock.at_ns(self.tracker.now_s)

@@ -7,8 +7,9 @@
 Mattfeld, Jesch and Hoover (2017, doi:10.1109/BIBM.2017.8217769): 30 people, each in a regular, a semi-regular and an
 irregular gait; Shimmer3 sensors at wrist, hip and ankle (x, y, z each), synchronised and laid on exactly 15 Hz by the
 authors. The wrist is read. `steps.txt` gives the line of the sample at which a step ends, from 0 (our reading: the
-authors say «line index»; from 1 would be 67 ms earlier), and the foot. Its `leftshift` and `rightshift`, a foot that
-is shifted and does not step, are no steps here, as in later comparisons on this data; the authors' 60,853 has them in.
+authors say «line index», and published loaders differ; from 1 would be 67 ms earlier), and the foot. Its `leftshift`
+and `rightshift`, a foot that is shifted and does not step, are no steps here, as in later comparisons on this data:
+56,668 of 60,801 lines are left (the authors' 60,853 has them in). Two shifts lie behind their recording's end.
 """
 
 from __future__ import annotations

@@ -53,7 +53,9 @@ def read_csv(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recordin
     absent = [name for name in ACC if name not in columns]
     if absent:
         raise RecordingError(
-            str(path), f"line {first - 1}: no column {', '.join(absent)}; the header must be {TIME},{','.join(ACC)}"
+            str(path),
+            f"line {first - 1}: no column {', '.join(absent)}; the header must be {TIME},{','.join(ACC)}"
+            ", or the columns be named with --columns",
         )
     table = numbers(path, lines, first=first, wanted=[columns.index(name) for name in wanted], names=columns)
     group = {name: table[:, wanted.index(name)] for name in wanted}

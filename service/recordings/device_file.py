@@ -7,15 +7,19 @@
 
 An Axivity block is stamped once, and its samples are laid at the nominal rate from there, although the sensor's own
 clock is some per cent off: the end of a block may then lie behind the next one's start. Here samples are spread evenly
-from one block's stamp to the next one's, as the makers' own software does. Stamps have no zone in either file and are
-taken as they are. Placement and subject come from the file where its owner wrote them.
+from one block's stamp to the next one's, as the makers' own software does. actfast skips the newer records of
+ActiGraph's acceleration without a word, so a `.gt3x` that holds one is refused rather than read in part. Stamps have no
+zone in either file and are taken as they are. Placement and subject come from the file where its owner wrote them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import IO, TYPE_CHECKING, Final
 from urllib.parse import parse_qs
 
 import numpy as np
@@ -34,6 +38,13 @@ over. Ours; Axivity's clocks are at most a tenth off."""
 RESERVED_BYTES: Final = (1_600_000_000, 2_400_000_000, 200_000_000)
 """What actfast 1.3 reserves for any `.gt3x`, however short. Where a machine refuses that, actfast ends the process, so
 it is asked for here before; none of it is touched."""
+
+LOG: Final = "log.bin"
+RECORD: Final = struct.Struct("<BBIH")
+"""Of each record in it: a separator, its kind, its second, the bytes of its payload; a byte of check sum ends it."""
+SEPARATOR: Final = 0x1E
+SKIPPED: Final = {26: "ACTIVITY2", 27: "ACTIVITY3"}
+"""Kinds of record with acceleration that actfast 1.3 passes over; pygt3x, which knows them, is under the GPL."""
 
 CWA_MAGIC: Final = b"MD"
 ZIP_MAGIC: Final = b"PK"
@@ -82,6 +93,7 @@ def _load(path: Path) -> ActfastResult:
     except ImportError as error:
         raise RecordingError(str(path), _INSTALL) from error
     if path.suffix.lower() == ".gt3x":
+        _check_records(path)
         _check_memory(path)
     try:
         return actfast.read(path)
@@ -92,6 +104,27 @@ def _load(path: Path) -> ActfastResult:
         if type(error).__module__ != _PANIC_MODULE:
             raise
         raise RecordingError(str(path), f"actfast cannot read it, the file is damaged: {error}") from error
+
+
+def _check_records(path: Path) -> None:
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(LOG) as log:
+            kind = next((kind for kind in _kinds(log) if kind in SKIPPED), None)
+    except (KeyError, OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError):
+        return  # a damaged archive is actfast's to refuse
+    if kind is not None:
+        why = f"it holds {SKIPPED[kind]} records, which actfast would leave out without a word"
+        raise RecordingError(str(path), f"{why}; export it as CSV with the maker's software")
+
+
+def _kinds(log: IO[bytes]) -> Iterator[int]:
+    """Yield the kind of each record up to the first damaged one."""
+    while len(head := log.read(RECORD.size)) == RECORD.size:
+        separator, kind, _, size = RECORD.unpack(head)
+        if separator != SEPARATOR:
+            return
+        yield kind
+        log.read(size + 1)
 
 
 def _check_memory(path: Path) -> None:

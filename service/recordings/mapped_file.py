@@ -4,17 +4,21 @@
     0;0.12;-0.31;9.79          units m/s2
     20;0.10;-0.28;9.81         time unit ms
 
+Beside them may be named gx, gy, gz (gyroscope), mx, my, mz (magnetometer, µT) and steps: a 1 at each step and else 0,
+or the number of steps so far, which never falls.
+
 A column is its name in the header (in any case) or its number from 1; where all are numbers, the file may have no
 header. Commas, semicolons (then with decimal commas or points), tabs and blanks part columns. Time may be dates.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -26,9 +30,12 @@ from service.recordings.recording import (
     Recording,
     median_rate_hz,
     merge_repeated_stamps,
+    spread_stamps,
 )
 from service.recordings.stamps import is_stamp, seconds_after_first
 from service.recordings.text_table import head_lines, header_cells, is_number, numbers, read_lines
+
+Named = TypeVar("Named", bound=StrEnum)
 
 
 class Unit(StrEnum):
@@ -48,8 +55,18 @@ class TimeUnit(StrEnum):
     NS = "ns"
 
 
+class GyroUnit(StrEnum):
+    """What rotation is written in."""
+
+    RAD_S = "rad/s"
+    DEG_S = "deg/s"
+
+
 PER_G: Final = {Unit.M_S2: STANDARD_GRAVITY, Unit.G: 1.0, Unit.MG: 1000.0}
 PER_S: Final = {TimeUnit.S: 1.0, TimeUnit.MS: 1e3, TimeUnit.US: 1e6, TimeUnit.NS: 1e9}
+PER_RAD_S: Final = {GyroUnit.RAD_S: 1.0, GyroUnit.DEG_S: 180 / math.pi}
+GYRO: Final = ("gx", "gy", "gz")
+MAG: Final = ("mx", "my", "mz")
 SUFFIXES: Final = (".csv", ".txt", ".tsv", ".dat")
 _SEPARATORS: Final = (";", "\t", ",")
 """In the order they are looked for: a comma may be a decimal one beside the others. Without any of them, blanks."""
@@ -57,37 +74,66 @@ _SEPARATORS: Final = (";", "\t", ",")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColumnMapping:
-    """Which columns hold what, by name or by number from 1; `time` None where the rate alone says it."""
+    """Which columns hold what, by name or by number from 1; `time` None where the rate alone says it.
+
+    Of gyroscope (`gx`…) and magnetometer (`mx`…) all three or none are named.
+    """
 
     x: str
     y: str
     z: str
     time: str | None = None
+    gx: str | None = None
+    gy: str | None = None
+    gz: str | None = None
+    mx: str | None = None
+    my: str | None = None
+    mz: str | None = None
+    steps: str | None = None
     unit: Unit = Unit.G
     time_unit: TimeUnit = TimeUnit.S
+    gyro_unit: GyroUnit = GyroUnit.RAD_S
 
-    def named(self) -> list[str]:
-        """Return the columns of x, y, z and, where there is one, of time."""
-        return [self.x, self.y, self.z, *([] if self.time is None else [self.time])]
+    def named(self) -> dict[str, str]:
+        """Return the column of each quantity that has one; x, y and z come first."""
+        columns = ((name, getattr(self, name)) for name in QUANTITIES)
+        return {name: column for name, column in columns if column is not None}
 
 
-def column_mapping(text: str, unit: str = "g", time_unit: str = "s") -> ColumnMapping:
-    """Return what `--columns time=t,x=ax,y=ay,z=az --units UNIT --time-unit UNIT` ask for.
+QUANTITIES: Final = (*AXES, *GYRO, *MAG, "steps", "time")
+
+
+def column_mapping(
+    text: str, unit: str | None = None, time_unit: str | None = None, gyro_unit: str | None = None
+) -> ColumnMapping:
+    """Return what `--columns time=t,x=ax,y=ay,z=az --units UNIT --time-unit UNIT --gyro-units UNIT` ask for.
 
     ParameterError where a column is missing, unknown or named twice, or a unit is unknown.
     """
     parts = [part.partition("=") for part in text.split(",")]
     found = {name.strip().lower(): column.strip() for name, _, column in parts}
-    wrong = [name for name, column in found.items() if name not in {*AXES, "time"} or not column]
+    wrong = [name for name, column in found.items() if name not in QUANTITIES or not column]
     if wrong or len(found) < len(parts) or not found.keys() >= set(AXES):
-        raise ParameterError("columns", text, "x, y, z and time once each are wanted, as in time=t,x=ax,y=ay,z=az")
+        why = "x, y, z and time once each are wanted, as in time=t,x=ax,y=ay,z=az; gx, gy, gz, mx, my, mz, steps may be"
+        raise ParameterError("columns", text, why)
+    for triple in (GYRO, MAG):
+        if 0 < len(found.keys() & set(triple)) < len(triple):
+            raise ParameterError("columns", text, f"all of {', '.join(triple)} are wanted, or none")
     if len(set(found.values())) < len(found):
         raise ParameterError("columns", text, "two of them are the same column")
+    return ColumnMapping(
+        **found,
+        unit=_known(Unit, "units", unit or Unit.G),
+        time_unit=_known(TimeUnit, "time-unit", time_unit or TimeUnit.S),
+        gyro_unit=_known(GyroUnit, "gyro-units", gyro_unit or GyroUnit.RAD_S),
+    )
+
+
+def _known(units: type[Named], option: str, text: str) -> Named:
     try:
-        return ColumnMapping(**found, unit=Unit(unit), time_unit=TimeUnit(time_unit))
+        return units(text)
     except ValueError as error:
-        known = f"units {', '.join(Unit)}; time units {', '.join(TimeUnit)}"
-        raise ParameterError("units", f"{unit}, {time_unit}", f"known are {known}") from error
+        raise ParameterError(option, text, f"known are {', '.join(units)}") from error
 
 
 def has_columns(head: bytes, mapping: ColumnMapping) -> bool:
@@ -110,25 +156,65 @@ def read_mapped(path: Path, mapping: ColumnMapping, *, rate_hz: float | None) ->
     separator = _separator(lines[top])
     names = header_cells(lines[top], separator)
     places = _places(names, mapping)
-    absent = [name for name, at in zip(mapping.named(), places, strict=True) if at is None]
+    absent = [name for name, at in zip(mapping.named().values(), places, strict=True) if at is None]
     if absent:
         raise RecordingError(str(path), f"line {top + 1}: no column {', '.join(absent)}; there are {', '.join(names)}")
-    where = [at for at in places if at is not None]
-    top += not is_number(lines[top].replace(*_decimal(separator)).split(separator)[where[0]])
+    where = {name: at for name, at in zip(mapping.named(), places, strict=True) if at is not None}
+    top += not is_number(lines[top].replace(*_decimal(separator)).split(separator)[where["x"]])
     rows, first = [line.replace(*_decimal(separator)) for line in lines[top:]], top + 1
-    acc = numbers(path, rows, first=first, wanted=where[:3], names=names, separator=separator)
+    measured = [name for name in where if name != "time"]
+    table = numbers(
+        path, rows, first=first, wanted=[where[name] for name in measured], names=names, separator=separator
+    )
     if mapping.time is None:
-        t_s = _even(path, len(acc), rate_hz)
+        t_s = _even(path, len(table), rate_hz)
     else:
-        t_s = _seconds(path, rows, first, names, where[3], separator, mapping.time_unit)
-    t_s, (acc_g,) = merge_repeated_stamps(t_s, acc / PER_G[mapping.unit])
-    assert acc_g is not None  # noqa: S101  # it was given
-    return Recording(path=path, t_s=t_s, acc_g=acc_g, rate_hz=rate_hz or median_rate_hz(t_s))
+        t_s = _seconds(path, rows, first, names, where["time"], separator, mapping.time_unit)
+    return _recording(path, t_s, dict(zip(measured, table.T, strict=True)), mapping, rate_hz)
+
+
+def _recording(
+    path: Path, stamps_s: Floats, group: Mapping[str, Floats], mapping: ColumnMapping, rate_hz: float | None
+) -> Recording:
+    """Return the recording that columns by quantity make, in g, rad/s and µT."""
+    acc, gyro, mag = (_triple(group, names) for names in (AXES, GYRO, MAG))
+    t_s = spread_stamps(stamps_s, acc, gyro, mag)
+    step_t_s = _step_times(path, t_s, group["steps"]) if "steps" in group else None
+    t_s, (acc, gyro, mag) = merge_repeated_stamps(t_s, acc, gyro, mag)
+    assert acc is not None  # noqa: S101  # its columns were checked
+    return Recording(
+        path=path,
+        t_s=t_s,
+        acc_g=acc / PER_G[mapping.unit],
+        rate_hz=rate_hz or median_rate_hz(t_s),
+        gyro_rad_s=None if gyro is None else gyro / PER_RAD_S[mapping.gyro_unit],
+        mag_ut=mag,
+        step_t_s=step_t_s,
+        true_steps=None if step_t_s is None else len(step_t_s),
+    )
+
+
+def _triple(group: Mapping[str, Floats], names: Sequence[str]) -> Floats | None:
+    return np.column_stack([group[name] for name in names]) if names[0] in group else None
+
+
+def _step_times(path: Path, t_s: Floats, told: Floats) -> Floats:
+    """Return the times of steps, from marks or from the number of steps so far."""
+    rises = np.diff(told, prepend=told[0])
+    if (rises < 0).any():
+        rises = told
+        if not np.isin(told, (0.0, 1.0)).all():
+            raise RecordingError(str(path), "steps: 1 at a step and else 0 is wanted, or a number that never falls")
+    elif (told % 1 != 0).any() or told[-1] - told[0] > len(told):
+        raise RecordingError(str(path), "steps: whole numbers are wanted, at most one step a sample")
+    return np.repeat(t_s, rises.astype(np.int64))
 
 
 def _even(path: Path, n: int, rate_hz: float | None) -> Floats:
     if rate_hz is None:
-        raise RecordingError(str(path), "no column of time is named and no rate declared; one of them is needed")
+        raise RecordingError(
+            str(path), "no column of time is named and no rate declared; one of them is needed (--rate-hz)"
+        )
     return np.arange(n) / rate_hz
 
 
@@ -160,7 +246,7 @@ def _decimal(separator: str | None) -> tuple[str, str]:
 
 def _places(names: Sequence[str], mapping: ColumnMapping) -> list[int | None]:
     """Return where the columns stand, None for one that is not there."""
-    return [_place(names, column.strip().lower()) for column in mapping.named()]
+    return [_place(names, column.strip().lower()) for column in mapping.named().values()]
 
 
 def _place(names: Sequence[str], column: str) -> int | None:

@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 
 from service.errors import RecordingError
-from service.recordings.recording import Floats, Recording, median_rate_hz, merge_repeated_stamps
+from service.recordings.recording import Floats, Recording, median_rate_hz, merge_repeated_stamps, spread_stamps
 from service.recordings.stamps import is_stamp, seconds_after_first
 from service.recordings.text_table import head_lines, header_cells, numbers, read_lines
 
@@ -48,7 +48,7 @@ def read_oxwalk(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recor
     marked = _STEPS in names
     wanted = [1, 2, 3, *([names.index(_STEPS)] if marked else [])]
     table = numbers(path, rows, first=first, wanted=wanted, names=names)
-    stamps_s = seconds_after_first(path, rows, first=first)
+    stamps_s = spread_stamps(seconds_after_first(path, rows, first=first), table[:, :3])
     step_t_s = _step_times(path, stamps_s, table[:, 3]) if marked else None
     t_s, (acc_g,) = merge_repeated_stamps(stamps_s, table[:, :3])
     assert acc_g is not None  # noqa: S101  # it was given

@@ -7,6 +7,7 @@ Whoever holds a Recording need not check it: the shapes agree, every value is fi
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,13 @@ NORM_G = (0.3, 3.0)
 """Median norms that can be gravity plus motion; the 993 recordings we measured lie within 0.91…1.86 g."""
 STANDARD_GRAVITY = 9.80665
 """m/s² in one g."""
+BLOCKS_FROM = 0.1
+"""Where a larger share of the samples repeats a stamp, stamps are those of blocks, and no slip of a logger."""
+MIN_BLOCKS = 3
+"""Fewer say nothing of the time between two samples."""
+PAUSE = 1.5
+"""A block that lasts this many times as long as usual is followed by a pause, over which nothing is spread."""
+COPIED_SHARE = 0.99
 _REST_G = (0.85, 1.2)
 """Median norms that make a guess of the unit credible."""
 
@@ -116,12 +124,42 @@ class Recording:
             raise self._fail(f"the median norm is {norm_g:.4g} g, gravity should make it about 1; {_fitting(norm_g)}")
 
 
+def spread_stamps(t_s: Floats, *columns: Floats | None) -> Floats:
+    """Return the times of samples whose stamps are those of whole blocks: even from one stamp to the next one.
+
+    So write loggers that round to tenths of a second, or stamp a packet. Times are returned as they are where few are
+    repeated, where they do not rise, and where what repeats is the sample too, written twice.
+    """
+    if t_s.ndim != 1 or not len(t_s) or not np.isfinite(t_s).all():
+        return t_s
+    new = np.diff(t_s, prepend=-np.inf) != 0
+    starts = np.flatnonzero(new)
+    if np.mean(~new) < BLOCKS_FROM or len(starts) < MIN_BLOCKS or (np.diff(t_s) < 0).any() or _copied(~new, columns):
+        return t_s
+    samples = np.diff(starts, append=len(t_s))
+    spacing_s = np.diff(t_s[starts]) / samples[:-1]
+    usual_s = float(np.median(spacing_s))
+    even_s = np.append(np.where(spacing_s > PAUSE * usual_s, usual_s, spacing_s), usual_s)
+    place = np.arange(len(t_s)) - np.repeat(starts, samples)
+    spread: Floats = t_s + np.repeat(even_s, samples) * place
+    return spread
+
+
+def _copied(repeats: NDArray[np.bool_], columns: Sequence[Floats | None]) -> bool:
+    """Tell whether nearly all samples with a repeated stamp are the one before once more."""
+    at = np.flatnonzero(repeats)
+    held = [column for column in columns if column is not None and len(column) == len(repeats)]
+    same = [(column[at] == column[at - 1]).reshape(len(at), -1).all(axis=1) for column in held]
+    return bool(held) and float(np.mean(np.all(same, axis=0))) > COPIED_SHARE
+
+
 def merge_repeated_stamps(t_s: Floats, *columns: Floats | None) -> tuple[Floats, list[Floats | None]]:
     """Drop every sample that bears the very stamp of the one before it, as loggers now and then write.
 
     Returns the times and the columns in the order given, None staying None; columns of another length stay as they
-    are, for the Recording to refuse.
+    are, for the Recording to refuse. Where whole blocks share a stamp their samples are spread instead.
     """
+    t_s = spread_stamps(t_s, *columns)
     keep = np.concatenate((np.ones(1, bool), np.diff(t_s) != 0)) if t_s.ndim == 1 and len(t_s) else np.ones(1, bool)
     if keep.all() or any(column is not None and len(column) != len(t_s) for column in columns):
         return t_s, list(columns)
@@ -129,9 +167,12 @@ def merge_repeated_stamps(t_s: Floats, *columns: Floats | None) -> tuple[Floats,
 
 
 def median_rate_hz(t_s: Floats) -> float:
-    """Return the rate that the median spacing of `t_s` says; 1 where times do not rise, which a Recording refuses."""
+    """Return the rate that the median spacing of `t_s` says; 1 where times do not rise, which a Recording refuses.
+
+    Rounded to a millionth: 0.01 s between stamps that are no exact fractions are 100 Hz, not 100.000000000002.
+    """
     spacing_s = float(np.median(np.diff(t_s))) if t_s.ndim == 1 and len(t_s) >= MIN_SAMPLES else 0.0
-    return 1.0 / spacing_s if spacing_s > 0 else 1.0
+    return round(1.0 / spacing_s, 6) or 1.0 / spacing_s if spacing_s > 0 else 1.0
 
 
 def _first(mask: NDArray[np.bool_]) -> int:

@@ -11,9 +11,13 @@ import functools
 import importlib.util
 import types
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 Kernel = Callable[..., Any]
+
+OPTIONS: Final[dict[str, Any]] = {"_nrt": False, "forceinline": True}
+"""Every call of a function counts references to its arrays up and down, atomically: two to three times the time of a
+counter. The caller holds the arrays anyway, so a kernel does without, and may then make or give back none."""
 
 
 def available() -> bool:
@@ -28,7 +32,7 @@ def compiled(kernel: Kernel) -> Kernel:
         return kernel
     import numba  # noqa: PLC0415  # heavy, and only where a whole recording is counted
 
-    jitted: Kernel = numba.njit(_with_compiled_callees(kernel))
+    jitted: Kernel = numba.njit(**OPTIONS)(_with_compiled_callees(kernel))
     return jitted
 
 

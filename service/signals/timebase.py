@@ -7,6 +7,7 @@ before it: so an emitted grid sample never changes, and packets of any size give
 The nominal rate is believed until a tick disproves it (deviates by more than its own resolution); then the rate is
 fitted over the last one to two hundred seconds of ticks and half the deviation is made good within the next stretch.
 A hole of up to FILL_S is interpolated; a longer one breaks the grid: it goes on at the first sample's own tick.
+Gyroscope and magnetometer lie on the grid of the acceleration; where blocks lack one, the grid goes on without it.
 """
 
 from __future__ import annotations
@@ -65,6 +66,15 @@ class Timebase:
         """Device time of the newest sample, in seconds after boot."""
         return self._lanes["acc_g"][grid.PLACE] / GRID_HZ if self._lanes else 0.0
 
+    @property
+    def uncertainty_s(self) -> float:
+        """How well device time knows where in a signal a sample of the grid lies, in seconds.
+
+        Half the spacing of the grid or of the device's own samples, whichever is wider; where it tells ticks, also half
+        a tick and how far the newest one lies off the grid.
+        """
+        return (0.5 * max(1.0, self._fit.pace) + self._fit.deviation) / GRID_HZ
+
     def set_clock(self, index: int, tick: int) -> None:
         """Take the device's full tick at a sample: tells the high bits of the ticks in packets."""
         self._clock = (index, tick)
@@ -76,6 +86,7 @@ class Timebase:
         last_s = self.now_s
         if broken:
             self._begin(block)
+        self._follow_sensors(block)
         self._fit.observe(block, self._start, self._stretch)
         first_s = (self._start + (block.index - self._stretch * TICK_EVERY) * self._pace) / GRID_HZ
         gap = None
@@ -105,12 +116,22 @@ class Timebase:
         if block.tick is not None:
             start = self._fit.anchor(start, _full_tick(block.tick, self._expected_tick(stretch, start)))
         self._stretch, self._start, self._pace = stretch, start, self._fit.pace
-        place = start + (block.index - stretch * TICK_EVERY) * self._pace
+        lane = [0.0] * grid.SIZE
+        lane[grid.PLACE] = start + (block.index - stretch * TICK_EVERY) * self._pace
+        lane[grid.NEXT] = float(math.ceil(lane[grid.PLACE] - grid.EPSILON))
+        self._lanes = {"acc_g": lane}
+
+    def _follow_sensors(self, block: RawBlock) -> None:
+        """Forget a sensor that `block` lacks; a new one begins beside the acceleration, at its first value."""
+        if block.gyro_rad_s is None and block.mag_ut is None and len(self._lanes) == 1:
+            return  # nothing to do, and most devices' case
         for name in _SENSORS:
-            if getattr(block, name) is not None:
-                lane = [0.0] * grid.SIZE
-                lane[grid.PLACE] = place
-                lane[grid.NEXT] = float(math.ceil(place - grid.EPSILON))
+            columns = getattr(block, name)
+            if columns is None:
+                self._lanes.pop(name, None)
+            elif name not in self._lanes:
+                lane = self._lanes["acc_g"].copy()
+                lane[grid.X], lane[grid.Y], lane[grid.Z] = (float(column[0]) for column in columns)
                 self._lanes[name] = lane
 
     def _expected_tick(self, stretch: int, start: float) -> float:
@@ -122,7 +143,7 @@ class Timebase:
 
     def _place(self, block: RawBlock) -> SampleBlock:
         """Run the kernel over `block`, stretch by stretch."""
-        names = [name for name in _SENSORS if getattr(block, name) is not None and name in self._lanes]
+        names = list(self._lanes)
         begun = int(self._lanes["acc_g"][grid.NEXT])
         made: dict[str, list[Any]] = {name: [] for name in names}
         done, n = 0, len(block)
@@ -172,6 +193,11 @@ class _RateFit:
         self._error = 0.0
         """How far that tick lies ahead of the grid, grid units."""
         self._anchors: list[tuple[int, float]] = []
+
+    @property
+    def deviation(self) -> float:
+        """How far the device's clock and the grid may differ, grid units; 0 where it has told no tick."""
+        return abs(self._error) + _TICK / 2 if self._seen else 0.0
 
     def anchor(self, start: float, tick: int) -> float:
         """Return where a stretch begins after a break: `start` if the tick agrees with it, else the tick's place."""

@@ -13,14 +13,15 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from service.samples import TICK_EVERY, Step, StepCounted
+from service.samples import TICK_EVERY, Heading, Step, StepCounted
 from service.store.values import SAMPLE_BYTES, Chunk, LogEntry, Note, stretches
 
 STEP: Final = "step"
 """Kind of a log entry that is a step."""
 LOG_COLUMNS: Final = (
     "ordinal, at_ns, uncertainty_s, run, kind, body, "
-    "boot, steps, at_s, strength, interval_s, peak, valley, upper, lower, counters.name"
+    "boot, steps, at_s, strength, interval_s, peak, valley, upper, lower, "
+    "step_uncertainty_s, heading_deg, heading_uncertainty_deg, heading_is_line, counters.name"
 )
 """What `entry` takes, of the log joined with the counters."""
 _ZLIB_LEVEL = 1
@@ -64,23 +65,26 @@ def to_json(value: Mapping[str, Any]) -> str:
 
 def entry(row: Sequence[Any]) -> LogEntry:
     """Return a row of LOG_COLUMNS as a log entry."""
-    ordinal, at_ns, uncertainty_s, run, kind, body, boot, steps, at_s, strength, *decided, counter = row
-    told: StepCounted | Note
-    if kind == STEP:
-        interval_s, peak, valley, upper, lower = decided
-        step = Step(
-            at_s=at_s,
-            strength=math.nan if strength is None else strength,  # SQLite has no NaN
-            interval_s=interval_s,
-            peak=peak,
-            valley=valley,
-            upper=upper,
-            lower=lower,
-        )
-        told = StepCounted(counter=counter, boot=boot, steps=steps, step=step)
-    else:
-        told = Note(kind=kind, body=json.loads(body))
+    ordinal, at_ns, uncertainty_s, run, kind, body, *step_row = row
+    told = _step(*step_row) if kind == STEP else Note(kind=kind, body=json.loads(body))
     return LogEntry(ordinal=ordinal, at_ns=at_ns, uncertainty_s=uncertainty_s, run=run, told=told)
+
+
+def _step(boot: int, steps: int, at_s: float, strength: float | None, *rest: Any) -> StepCounted:  # noqa: ANN401
+    interval_s, peak, valley, upper, lower, uncertainty_s, deg, uncertainty_deg, is_line, counter = rest
+    step = Step(
+        at_s=at_s,
+        strength=math.nan if strength is None else strength,  # SQLite has no NaN
+        interval_s=interval_s,
+        peak=peak,
+        valley=valley,
+        upper=upper,
+        lower=lower,
+    )
+    heading = None
+    if deg is not None:
+        heading = Heading(deg=deg, uncertainty_deg=uncertainty_deg, is_line=bool(is_line))
+    return StepCounted(counter=counter, boot=boot, steps=steps, step=step, uncertainty_s=uncertainty_s, heading=heading)
 
 
 def cut(chunk: Chunk, first: int, end: int) -> Chunk:

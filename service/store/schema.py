@@ -105,6 +105,10 @@ _VERSION_1 = (
         valley REAL,
         upper REAL,
         lower REAL,
+        step_uncertainty_s REAL,
+        heading_deg REAL,
+        heading_uncertainty_deg REAL,
+        heading_is_line INTEGER,
         PRIMARY KEY (device, ordinal)
     ) STRICT, WITHOUT ROWID
     """,

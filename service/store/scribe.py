@@ -25,8 +25,10 @@ _RAW = """
     WHERE excluded.samples > samples
 """
 _DESCRIPTION = "INSERT OR REPLACE INTO descriptions VALUES (?, ?, ?, ?, ?, ?, ?)"
-_LOG = "INSERT INTO log VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING"
-_LOGGED = "SELECT * FROM log WHERE device = ? AND ordinal = ?"
+_LOG_COLUMNS = 22
+_STEP_COLUMNS = 14
+_LOG = f"INSERT INTO log VALUES ({', '.join('?' * _LOG_COLUMNS)}) ON CONFLICT DO NOTHING"  # noqa: S608
+_LOGGED = "SELECT session, run, kind, body, counter, steps, at_s FROM log WHERE device = ? AND ordinal = ?"
 _TALLY = "INSERT INTO tallies VALUES (?, ?, 1) ON CONFLICT DO UPDATE SET steps = steps + 1"
 _CURSOR = """
     UPDATE sessions SET cursor_run = ?1, cursor_boot = ?2, cursor_index = ?3
@@ -130,7 +132,10 @@ class Scribe:
                 self.connection.execute(_TALLY, (session, counter))
             return
         there = self._row(_LOGGED, (device, told.ordinal))
-        if there is not None and there != row:
+        same = tuple(
+            row[k] for k in (2, 5, 6, 7, 8, 10, 11)
+        )  # host time and uncertainties may be others: the first stay
+        if there is not None and there != same:
             why = f"event {told.ordinal} of the device is another one already: numbers go on from `last_ordinal`"
             raise StoreError(StoreFault.REFUSED, why)
 
@@ -139,12 +144,13 @@ class Scribe:
         head = (device, told.ordinal, session, told.at_ns, float(told.uncertainty_s), told.run)
         event = told.told
         if not isinstance(event, StepCounted):
-            return None, (*head, event.kind, codec.to_json(event.body), *(None,) * 10)
+            return None, (*head, event.kind, codec.to_json(event.body), *(None,) * _STEP_COLUMNS)
         counter = self._number(self._counters, "counters", {"name": event.counter})
-        step = event.step
-        decided = (step.strength, step.interval_s, step.peak, step.valley, step.upper, step.lower)
-        numbers = (None if value is None or math.isnan(value) else float(value) for value in decided)
-        return counter, (*head, codec.STEP, None, counter, event.boot, event.steps, float(step.at_s), *numbers)
+        step, heading = event.step, event.heading
+        values = (step.strength, step.interval_s, step.peak, step.valley, step.upper, step.lower, event.uncertainty_s)
+        numbers = [None if value is None or math.isnan(value) else float(value) for value in values]
+        way = (heading.deg, heading.uncertainty_deg, int(heading.is_line)) if heading else (None,) * 3
+        return counter, (*head, codec.STEP, None, counter, event.boot, event.steps, float(step.at_s), *numbers, *way)
 
     def _move_cursor(self, session: int, cursor: Cursor) -> None:
         self.connection.execute(_CURSOR, (cursor.run, cursor.boot, cursor.index, session))

@@ -1,10 +1,17 @@
-"""Likely steps as they come and go: told at once, taken back where the counter thinks better of it."""
+"""Likely steps as they come and go: told at once, taken back where the counter thinks better of it.
+
+For each step the same order holds, whatever the packets: told as likely, then either retracted or confirmed. One that
+is confirmed in the packet in which it is first seen is told just before.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
+from typing import Any
 
-from service.samples import Step, Tentative
+from service.samples import Likely, Step, Tentative
 
 _LONGEST_S = 2.0
 """A longer time since the step before is a pause, not an interval."""
@@ -14,38 +21,53 @@ class TentativeSteps:
     """What a counter calls likely, from block to block, as events."""
 
     def __init__(self) -> None:
-        self._open: dict[float, float] = {}
-        """Strength of each likely step told and neither confirmed nor retracted, by device time."""
-        self._last_s: float | None = None
+        self._open: dict[float, Tentative] = {}
+        """What was told and neither confirmed nor retracted, by device time."""
+        self._confirmed_s: float | None = None
 
-    def follow(self, boot: int, likely: Sequence[tuple[float, float]], confirmed: Sequence[Step]) -> list[Tentative]:
-        """Return the events that lead from what was told to `likely`, steps `confirmed` meanwhile being no loss."""
-        if not likely and not self._open:
+    def follow(self, boot: int, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Tentative]:
+        """Return the events that lead from what was told to `likely` and to steps `confirmed` meanwhile."""
+        if not likely and not self._open and not confirmed:
             return []
-        known, now = self._open, dict(likely)
         certain = {step.at_s for step in confirmed}
+        now = {at_s: (strength, passes) for at_s, strength, passes in likely if at_s not in certain}
+        told = self._open
+        self._open = {at_s: event for at_s, event in told.items() if at_s in now}
         events = [
-            Tentative(boot=boot, at_s=at_s, strength=strength, interval_s=None, retracted=True)
-            for at_s, strength in known.items()
+            replace(event, interval_s=None, retracted=True)
+            for at_s, event in told.items()
             if at_s not in now and at_s not in certain
         ]
-        for at_s in sorted(now.keys() - known.keys()):
-            interval_s = self._interval_s(at_s)
-            events.append(Tentative(boot=boot, at_s=at_s, strength=now[at_s], interval_s=interval_s, retracted=False))
-            self._last_s = at_s
-        self._open = now
+        for step in confirmed:
+            if step.at_s not in told:
+                events.append(self._tell(boot, step.at_s, step.strength, passes=True))
+            self._confirmed_s = step.at_s
+        for at_s in sorted(now.keys() - told.keys()):
+            strength, passes = now[at_s]
+            self._open[at_s] = self._tell(boot, at_s, strength, passes=passes)
+            events.append(self._open[at_s])
         return events
 
     def snapshot(self) -> list[object]:
         """Return the state as plain data."""
-        return [list(map(list, self._open.items())), self._last_s]
+        told = [[event.boot, at_s, event.strength, event.passes] for at_s, event in self._open.items()]
+        return [told, self._confirmed_s]
 
-    def restore(self, state: list[list[list[float]] | float | None]) -> None:
+    def restore(self, state: Sequence[Any]) -> None:
         """Take over a snapshot's state."""
-        told, last_s = state
-        self._open = {entry[0]: entry[1] for entry in told} if isinstance(told, list) else {}
-        self._last_s = last_s if isinstance(last_s, float) else None
+        told, self._confirmed_s = state
+        self._open = {entry[1]: _event(*entry) for entry in told}
+
+    def _tell(self, boot: int, at_s: float, strength: float, *, passes: bool) -> Tentative:
+        return replace(_event(boot, at_s, strength, passes), interval_s=self._interval_s(at_s))
 
     def _interval_s(self, at_s: float) -> float | None:
-        since_s = None if self._last_s is None else at_s - self._last_s
-        return since_s if since_s is not None and 0 < since_s <= _LONGEST_S else None
+        sure = [event.at_s for event in self._open.values() if event.passes and event.at_s < at_s]
+        if self._confirmed_s is not None and self._confirmed_s < at_s:
+            sure.append(self._confirmed_s)
+        since_s = at_s - max(sure, default=-inf)
+        return since_s if since_s <= _LONGEST_S else None
+
+
+def _event(boot: int, at_s: float, strength: float, passes: bool) -> Tentative:
+    return Tentative(boot=boot, at_s=at_s, strength=strength, interval_s=None, passes=passes, retracted=False)

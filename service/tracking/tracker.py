@@ -8,7 +8,7 @@ skipped; samples seen before are dropped; samples that arrive late, behind newer
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,17 +22,24 @@ from service.samples import (
     Described,
     DeviceInfo,
     Event,
+    Gridded,
+    Likely,
     Packet,
     RawBlock,
     Rebooted,
     Segmented,
+    Sensor,
+    Sensors,
     Signal,
+    Step,
     StepCounted,
     Update,
 )
+from service.signals.heading import WalkingDirection
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
 from service.tracking.doubt import Doubt, index_ahead
+from service.tracking.fitness import Stream, faults
 from service.tracking.tentative import TentativeSteps
 from service.wearables.contract import Wearable
 
@@ -48,6 +55,7 @@ class Tally:
     packets_duplicate: int = 0
     samples: int = 0
     samples_lost: int = 0
+    samples_saturated: int = 0
     gaps: int = 0
     reboots: int = 0
 
@@ -68,12 +76,17 @@ class Tracker:
         """The device's steps when the primary took over, and the primary's own count then."""
         self.last_fault: WireError | None = None
         self.counter_faults: dict[str, str] = {}
-        """Why a counter does not count, as a sentence: a sensor that the device does not send."""
+        """Why a counter does not count, as a sentence: a sensor that the device does not send, or too low a rate."""
+        self._judged: object = None
+        self._held: Sensors | None = None
+        self._measured_hz = 0.0
+        """What the newest block held, and the rate after it."""
         self._wearable = wearable
         self._factories = dict(counters)
         self._counters = {name: make() for name, make in counters.items()}
         self._cadence = Cadence()
         self._tentative = TentativeSteps()
+        self._heading = WalkingDirection()
         self._timebase: Timebase | None = None
         self._boot: int | None = None
         self._next_index = 0
@@ -102,6 +115,12 @@ class Tracker:
         """The device's sampling rate as its own clock tells it."""
         return self._timebase.measured_rate_hz if self._timebase else None
 
+    @property
+    def stream(self) -> Stream:
+        """What is known of what the device sends."""
+        rates = [rate_hz for rate_hz in (self.info.rate_hz, self.measured_rate_hz) if rate_hz is not None]
+        return Stream(has=self.info.sensors, holds=self._held, rate_hz=min(rates, default=None))
+
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
         said: RawBlock | DeviceInfo | None = None
@@ -122,29 +141,28 @@ class Tracker:
     def change_counters(self, counters: Mapping[str, CounterFactory], *, primary: str) -> list[Event]:
         """Go on with other counters: equal ones as they are, the others afresh from the next sample on.
 
-        Another primary, or other parameters of it, begin a new segment of the device's count.
+        Another primary, or other parameters of it, begin a new segment of the device's count. Where a counter cannot be
+        built its error is raised, and nothing has changed.
         """
         kept = {name for name, make in counters.items() if self._factories.get(name) == make}
+        running = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
         dropped = [name for name in self._counters if name not in kept]
-        events = [event for name in dropped for event in self._confirm(name, self._counters[name].finish())]
+        events = [event for name in dropped for event in self._take(name, self._counters[name].finish())]
         before = self.total
         self.steps = {name: self.steps[name] if name in kept else 0 for name in counters}
-        self._counters = {name: self._counters[name] if name in kept else make() for name, make in counters.items()}
-        self.counter_faults = {name: why for name, why in self.counter_faults.items() if name in kept}
-        self._factories = dict(counters)
+        self._counters, self._factories = running, dict(counters)
+        self._judged = None
+        self._judge()
         if primary == self.primary and primary in kept:
             return events
         self.primary, self._segment = primary, (before, self.steps[primary])
         self._cadence = Cadence()
-        events += self._tentative.follow(self._boot or 0, (), ())
+        events += self._follow((), ())
         return [*events, Segmented(primary=primary, steps=before), self._counting(0)]
 
     def finish(self) -> list[Event]:
         """End the stream: decide what is still pending."""
-        events = self._finish_counters()
-        confirmed = [event.step for event in events if isinstance(event, StepCounted)]
-        events += self._tentative.follow(self._boot or 0, (), confirmed)
-        return [*events, self._counting(0)]
+        return [*self._finish_counters(), self._counting(0)]
 
     def snapshot(self) -> dict[str, Any]:
         """Return the whole state as plain data."""
@@ -157,6 +175,7 @@ class Tracker:
             "segment": list(self._segment),
             "cadence": self._cadence.snapshot(),
             "tentative": self._tentative.snapshot(),
+            "heading": self._heading.snapshot(),
             "boot": self._boot,
             "next_index": self._next_index,
             "counter_faults": dict(self.counter_faults),
@@ -169,8 +188,9 @@ class Tracker:
         """Take over a snapshot's state; SnapshotError where its counters are not ours."""
         for uuid, data in state["said"].items():
             self.apply(Packet(characteristic=uuid, data=bytes.fromhex(data), at_ns=0))
-        clock = state["info"]["clock"]
-        self.info = DeviceInfo(**{**state["info"], "clock": clock and (clock[0], clock[1])})
+        info = state["info"]
+        clock, sensors = info["clock"] and tuple(info["clock"]), info["sensors"] and tuple(map(Sensor, info["sensors"]))
+        self.info = DeviceInfo(**{**info, "clock": clock, "sensors": sensors})
         for name, counter in self._counters.items():
             counter.restore(state["counters"][name])
         self.tally = Tally(**state["tally"])
@@ -179,6 +199,7 @@ class Tracker:
         self._segment = (before, own)
         self._cadence.restore(state["cadence"])
         self._tentative.restore(state["tentative"])
+        self._heading.restore(state["heading"])
         self._boot, self._next_index = state["boot"], state["next_index"]
         self.counter_faults = dict(state["counter_faults"])
         self._doubt.restore(state["doubt"])
@@ -192,6 +213,7 @@ class Tracker:
         if info == self.info:
             return []
         self.info = info
+        self._judge()
         return [Described(info=info)]
 
     def _receive(self, block: RawBlock) -> list[Event]:
@@ -216,25 +238,37 @@ class Tracker:
         samples, gap = timebase.feed(fresh)
         self._next_index = fresh.index + len(fresh)
         self.tally.samples += len(fresh)
+        self.tally.samples_saturated += len(fresh.saturated)
+        if fresh.sensors is not self._held or timebase.measured_rate_hz != self._measured_hz:
+            self._held, self._measured_hz = fresh.sensors, timebase.measured_rate_hz
+            self._judge()
         if gap is not None:
             self.tally.gaps += 1
             self.tally.samples_lost += gap.samples
             events.append(gap)
-        pending = 0
+        self._heading.update(samples)
+        events.append(Gridded(block=samples))
+        pending = self.steps_now - self.total if self.primary in self.counter_faults else 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
             try:
                 update = self._counters[name].update(samples)
             except CounterError as fault:
                 self.counter_faults[name] = str(fault)
                 continue
-            events += self._confirm(name, update)
+            events += self._take(name, update)
             if name == self.primary:
                 pending = update.pending
-                events += self._tentative.follow(self._boot or 0, update.likely, update.steps)
                 if len(update.trace) or update.bands:
                     events.append(Signal(from_s=update.trace_from_s, values=update.trace, bands=update.bands))
         events.append(self._counting(pending))
         return events
+
+    def _judge(self) -> None:
+        """Find the counters that cannot count what the device has or sends, where that may have changed."""
+        stream = self.stream
+        judged = (stream.has, stream.holds, stream.too_slow)
+        if judged != self._judged:
+            self._judged, self.counter_faults = judged, faults(self._counters, stream)
 
     def _follow_boot(self, boot: int) -> list[Event]:
         if self._boot == boot:
@@ -249,11 +283,9 @@ class Tracker:
         previous = boot if self._boot is None else self._boot
         self.tally.reboots += 1
         events = self._finish_counters()
-        confirmed = [event.step for event in events if isinstance(event, StepCounted)]
-        events += self._tentative.follow(previous, (), confirmed)
         self._counters = {name: make() for name, make in self._factories.items()}
-        self._cadence = Cadence()
-        self._timebase, self._next_index = None, 0
+        self._cadence, self._tentative = Cadence(), TentativeSteps()
+        self._timebase, self._next_index, self._heading = None, 0, WalkingDirection()
         if self.info.boot != boot or previous == boot:
             self.info = dataclasses.replace(self.info, boot=boot, clock=None)
         self._boot = boot
@@ -266,15 +298,16 @@ class Tracker:
             index = self._next_index + index_ahead(block.index, self._next_index)
         seen = max(0, self._next_index - index) if self._timebase else 0
         if seen == 0:
-            return dataclasses.replace(block, index=index)
+            return block if index == block.index else dataclasses.replace(block, index=index)
         if seen >= len(block):
             return None
         # The tick is of the stretch the block began in; what is left of it may begin in the next.
         same_stretch = index // TICK_EVERY == (index + seen) // TICK_EVERY
-        return RawBlock(
-            boot=block.boot,
+        return dataclasses.replace(
+            block,
             index=index + seen,
             tick=block.tick if same_stretch else None,
+            saturated=[at - seen for at in block.saturated if at >= seen],
             acc_g=_cut(block.acc_g, seen),
             gyro_rad_s=_cut(block.gyro_rad_s, seen) if block.gyro_rad_s else None,
             mag_ut=_cut(block.mag_ut, seen) if block.mag_ut else None,
@@ -287,17 +320,45 @@ class Tracker:
                 self._timebase.set_clock(*self.info.clock)
         return self._timebase
 
-    def _confirm(self, name: str, update: Update) -> list[Event]:
+    def _take(self, name: str, update: Update) -> list[Event]:
+        """Take what a counter says: of the primary, tentative steps first, so that each step has been told before."""
         events: list[Event] = []
+        if name == self.primary:
+            events += self._follow(update.likely, update.steps)
         for step in update.steps:
             self.steps[name] += 1
-            events.append(StepCounted(counter=name, boot=self._boot or 0, steps=self.steps[name], step=step))
+            events.append(
+                StepCounted(
+                    counter=name,
+                    boot=self._boot or 0,
+                    steps=self.steps[name],
+                    step=step,
+                    uncertainty_s=self._uncertainty_s(name),
+                    heading=self._heading.at(step.at_s),
+                )
+            )
             if name == self.primary:
                 self._cadence.add(step.at_s)
         return events
 
+    def _follow(self, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Event]:
+        """Tell what the primary calls likely, and take back what it does no more."""
+        told = self._tentative.follow(self._boot or 0, likely, confirmed)
+        if not told:
+            return []
+        uncertainty_s = self._uncertainty_s(self.primary)
+        return [
+            dataclasses.replace(event, uncertainty_s=uncertainty_s, heading=self._heading.at(event.at_s))
+            for event in told
+        ]
+
+    def _uncertainty_s(self, name: str) -> float:
+        """Return how well the device time of this counter's steps is known."""
+        timebase_s = self._timebase.uncertainty_s if self._timebase else 0.5 / GRID_HZ
+        return timebase_s + self._counters[name].time_error_s
+
     def _finish_counters(self) -> list[Event]:
-        return [event for name, counter in self._counters.items() for event in self._confirm(name, counter.finish())]
+        return [event for name, counter in self._counters.items() for event in self._take(name, counter.finish())]
 
     def _counting(self, pending: int) -> Counting:
         steps = self.total

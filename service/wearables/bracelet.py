@@ -10,18 +10,33 @@ Service `5e9a0001-4b1d-4c0e-8f3a-73746570b001`; all numbers little endian; every
 | boot      | 0005 | read   | u32, number of the boot: one more at each reset, wraps |
 | device id | 0006 | read   | 1–20 bytes of UTF-8, the same for ever |
 | clock     | 0007 | read   | u32 index of a sample (a multiple of 128), u64 tick at it |
+| sensors   | 0008 | read   | what it measures, below; without this characteristic acceleration only |
 
 | packet at | type | field |
 | --- | --- | --- |
-| 0 | u8  | bits 0–3 version = 1; bit 4: sent again from history; bits 5–7 zero |
+| 0 | u8  | bits 0–3 version = 1; bit 4: sent again from history; bits 5, 6: samples hold g, m; bit 7 zero |
 | 1 | u8  | low 8 bits of the boot number |
 | 2 | u32 | index of the first sample since boot; wraps |
 | 6 | u16 | low 16 bits of the tick (1/1024 s since boot) at sample `index − index mod 128` |
-| 8 | n × 3 × i16 | x, y, z of n ≥ 1 samples; n = 2 at MTU 23, 84 at MTU 517 |
+| 8 | n × 3k × i16 | n ≥ 1 samples, each x, y, z of acceleration, then of g, then of m, of those it holds |
 
+| sensors at | type | field |
+| --- | --- | --- |
+| 0 | u8  | bit 0: accelerometer, always 1; bit 1: gyroscope; bit 2: magnetometer; bits 3–7 zero |
+| 1 | u16 | g: LSB per rad/s of angular rate (900: ±36 rad/s or 2086 °/s); 0 without a gyroscope |
+| 3 | u16 | m: LSB per 100 µT of field (6400: ±512 µT, ten times the Earth's); 0 without a magnetometer |
+
+| samples of | bytes | n at MTU 23 | at 185 | at 517 |
+| --- | --- | --- | --- | --- |
+| acceleration | 6 | 2 | 29 | 84 |
+| acceleration and g or m | 12 | 1 | 14 | 42 |
+| all three | 18 | none: m is left out | 9 | 28 |
+
+A packet tells by itself what its samples hold. Where one sample of all sensors does not fit (MTU 23 to 28), m is left
+out and the rest sent; who needs m asks for a larger MTU. Axes are the same for all three, right-handed.
 The index counts samples, not packets, and the tick is taken at every 128th sample only: so packets of any size say the
-same about the same samples. A value outside i16 is sent as its limit. Beside it stand the standard Battery (180F) and
-Device Information (180A) services.
+same about the same samples. A value outside i16 is sent as its limit, and one at its limit is taken for saturated.
+Beside it stand the standard Battery (180F) and Device Information (180A) services.
 """
 
 from __future__ import annotations
@@ -32,7 +47,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from service.errors import ParameterError, WireError, WireFault
-from service.samples import TICK_EVERY, DeviceInfo, RawBlock
+from service.samples import ACCELEROMETER_ONLY, TICK_EVERY, Columns, DeviceInfo, RawBlock, Sensor, Sensors
 from service.wearables.contract import Action, Read, Subscribe, Write
 
 
@@ -51,6 +66,7 @@ RATE: Final = _uuid(4)
 BOOT: Final = _uuid(5)
 DEVICE_ID: Final = _uuid(6)
 CLOCK: Final = _uuid(7)
+SENSORS: Final = _uuid(8)
 BATTERY_LEVEL: Final = _sig(0x2A19)
 MANUFACTURER_NAME: Final = _sig(0x2A29)
 MODEL_NUMBER: Final = _sig(0x2A24)
@@ -58,22 +74,44 @@ FIRMWARE_REVISION: Final = _sig(0x2A26)
 
 VERSION: Final = 1
 FLAG_HISTORY: Final = 0x10
-_FLAGS_RESERVED: Final = 0xE0
+FLAG_GYROSCOPE: Final = 0x20
+FLAG_MAGNETOMETER: Final = 0x40
+_FLAGS_RESERVED: Final = 0x80
 ID_RULE: Final = "1 to 20 bytes of printable UTF-8 without /"
 ATT_HEADER: Final = 3
 """Bytes of a notification that are not value: op code and handle."""
 _HEADER: Final = struct.Struct("<BBIH")
-_SAMPLE_BYTES: Final = 6
+_SENSORS: Final = struct.Struct("<BHH")
+_TRIPLE_BYTES: Final = 6
 _I16_MIN, _I16_MAX = -32768, 32767
+_LOWEST, _HIGHEST = struct.pack("<h", _I16_MIN), struct.pack("<h", _I16_MAX)
 LONGEST_UPTIME_TICKS: Final = 1 << 42
 """136 years: no device runs longer, and device time stays exact to far below a sample."""
 DEFAULT_LSB_PER_G: Final = 4096
 """±8 g in 16 bits: running on the wrist passes ±4 g."""
+DEFAULT_LSB_PER_RAD_S: Final = 900
+"""±2086 °/s: the widest range of the usual gyroscopes is ±2000."""
+DEFAULT_LSB_PER_100_UT: Final = 6400
+"""±512 µT: the Earth's field is 25 to 65, a magnet near the wrist several times that."""
+_OPTIONAL: Final = (Sensor.GYROSCOPE, Sensor.MAGNETOMETER)
+_UNITS: Final = {Sensor.GYROSCOPE: 1.0, Sensor.MAGNETOMETER: 100.0}
+"""What a scale on the wire is per, in rad/s and µT."""
+_HELD: Final[dict[int, Sensors]] = {
+    0: ACCELEROMETER_ONLY,
+    FLAG_GYROSCOPE: (Sensor.ACCELEROMETER, Sensor.GYROSCOPE),
+    FLAG_MAGNETOMETER: (Sensor.ACCELEROMETER, Sensor.MAGNETOMETER),
+    FLAG_GYROSCOPE | FLAG_MAGNETOMETER: tuple(Sensor),
+}
 
 
-def samples_per_packet(mtu: int) -> int:
-    """Return how many samples one notification holds at an ATT MTU of `mtu` bytes: 2 at 23, 84 at 517."""
-    return (mtu - ATT_HEADER - _HEADER.size) // _SAMPLE_BYTES
+def packet_sensors(mtu: int, sensors: Sensors) -> Sensors:
+    """Return those of `sensors` that a packet's samples hold at an ATT MTU of `mtu` bytes: the last do not fit 23."""
+    return sensors[: (mtu - ATT_HEADER - _HEADER.size) // _TRIPLE_BYTES]
+
+
+def samples_per_packet(mtu: int, sensors: Sensors = ACCELEROMETER_ONLY) -> int:
+    """Return how many samples one notification holds at an ATT MTU of `mtu` bytes: of acceleration 2 at 23."""
+    return (mtu - ATT_HEADER - _HEADER.size) // (_TRIPLE_BYTES * len(packet_sensors(mtu, sensors)))
 
 
 def tick_index(index: int) -> int:
@@ -83,20 +121,28 @@ def tick_index(index: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataPacket:
-    """One packet before encoding; `counts` are (x, y, z) in LSB, saturated to i16 when encoded."""
+    """One packet before encoding; `counts` are each sample's x, y, z of each of `sensors`, in LSB.
+
+    They are saturated to i16 when encoded.
+    """
 
     boot: int
     index: int
     tick: int
-    counts: Sequence[tuple[int, int, int]]
+    counts: Sequence[Sequence[int]]
     history: bool = False
+    sensors: Sensors = ACCELEROMETER_ONLY
 
 
 def encode(packet: DataPacket) -> bytes:
-    """Return the packet's bytes."""
+    """Return the packet's bytes; ValueError where a sample is not as wide as its sensors."""
+    if any(len(sample) != 3 * len(packet.sensors) for sample in packet.counts):
+        raise ValueError(f"three values a sample of each of {', '.join(packet.sensors)}")
     flags = VERSION | (FLAG_HISTORY if packet.history else 0)
+    flags |= FLAG_GYROSCOPE if Sensor.GYROSCOPE in packet.sensors else 0
+    flags |= FLAG_MAGNETOMETER if Sensor.MAGNETOMETER in packet.sensors else 0
     header = _HEADER.pack(flags, packet.boot & 0xFF, packet.index & 0xFFFFFFFF, packet.tick & 0xFFFF)
-    flat = [min(max(value, _I16_MIN), _I16_MAX) for xyz in packet.counts for value in xyz]
+    flat = [min(max(value, _I16_MIN), _I16_MAX) for sample in packet.counts for value in sample]
     return header + struct.pack(f"<{len(flat)}h", *flat)
 
 
@@ -128,13 +174,23 @@ def encode_clock(index: int, tick: int) -> bytes:
     return struct.pack("<IQ", index & 0xFFFFFFFF, tick)
 
 
+def encode_sensors(sensors: Sensors, *, lsb_per_rad_s: int, lsb_per_100_ut: int) -> bytes:
+    """Return the sensors characteristic's value; scales 1…65535, those of sensors that are not there are left out."""
+    mask = sum(1 << bit for bit, sensor in enumerate(Sensor) if sensor in sensors)
+    gyroscope = lsb_per_rad_s if Sensor.GYROSCOPE in sensors else 0
+    magnetometer = lsb_per_100_ut if Sensor.MAGNETOMETER in sensors else 0
+    return _SENSORS.pack(mask, gyroscope, magnetometer)
+
+
 class Bracelet:
     """The host's side of the protocol: what to do after connecting, and bytes to samples."""
 
     services: Sequence[str] = (SERVICE,)
 
     def __init__(self) -> None:
-        self._lsb_per_g: float | None = None
+        self._sensors = ACCELEROMETER_ONLY
+        self._scales: dict[Sensor, float] = {}
+        """LSB per unit of each sensor whose scale was read."""
         self._boot: int | None = None
         self._readers: dict[str, Callable[[bytes], RawBlock | DeviceInfo]] = {
             DATA: self._data,
@@ -143,6 +199,7 @@ class Bracelet:
             BOOT: self._boot_number,
             DEVICE_ID: _device_id,
             CLOCK: _clock,
+            SENSORS: self._sensors_told,
             BATTERY_LEVEL: _battery,
             MANUFACTURER_NAME: lambda data: DeviceInfo(manufacturer=_text(data, MANUFACTURER_NAME)),
             MODEL_NUMBER: lambda data: DeviceInfo(model=_text(data, MODEL_NUMBER)),
@@ -152,7 +209,9 @@ class Bracelet:
     def handshake(self) -> Sequence[Action]:
         """Read who, how fast and how large; then subscribe. The standard services may be missing."""
         return (
-            *(Read(characteristic=uuid) for uuid in (DEVICE_ID, BOOT, SCALE, RATE, CLOCK)),
+            *(Read(characteristic=uuid) for uuid in (DEVICE_ID, BOOT)),
+            Read(characteristic=SENSORS, optional=True),
+            *(Read(characteristic=uuid) for uuid in (SCALE, RATE, CLOCK)),
             *(
                 Read(characteristic=uuid, optional=True)
                 for uuid in (MANUFACTURER_NAME, MODEL_NUMBER, FIRMWARE_REVISION, BATTERY_LEVEL)
@@ -171,24 +230,34 @@ class Bracelet:
         return ()
 
     def _data(self, data: bytes) -> RawBlock:
-        if len(data) < _HEADER.size + _SAMPLE_BYTES or (len(data) - _HEADER.size) % _SAMPLE_BYTES:
-            raise WireError(WireFault.LENGTH, f"a packet of {len(data)} bytes; 8 + 6 n are valid, n ≥ 1")
+        if len(data) < _HEADER.size:
+            raise WireError(WireFault.LENGTH, f"a packet of {len(data)} bytes; its header alone has {_HEADER.size}")
         flags, boot_low, index, tick = _HEADER.unpack_from(data)
         if flags & 0x0F != VERSION or flags & _FLAGS_RESERVED:
             raise WireError(WireFault.VERSION, f"version and flags {flags:#04x}; this is version {VERSION}")
-        if self._lsb_per_g is None:
+        if Sensor.ACCELEROMETER not in self._scales:
             raise WireError(WireFault.ORDER, "a packet before the scale was read")
-        n = (len(data) - _HEADER.size) // _SAMPLE_BYTES
-        values = struct.unpack_from(f"<{3 * n}h", data, _HEADER.size)
-        scale = self._lsb_per_g
-        x, y, z = ([value / scale for value in values[axis::3]] for axis in range(3))
+        held = _HELD[flags & (FLAG_GYROSCOPE | FLAG_MAGNETOMETER)]
+        values = _values(data, held)
         return RawBlock(
             boot=self._full_boot(boot_low),
             index=index,
             tick=tick,
             history=bool(flags & FLAG_HISTORY),
-            acc_g=(x, y, z),
+            saturated=_saturated(data, values, held),
+            acc_g=self._columns(Sensor.ACCELEROMETER, values, held),
+            gyro_rad_s=self._columns(Sensor.GYROSCOPE, values, held) if flags & FLAG_GYROSCOPE else None,
+            mag_ut=self._columns(Sensor.MAGNETOMETER, values, held) if flags & FLAG_MAGNETOMETER else None,
         )
+
+    def _columns(self, sensor: Sensor, values: tuple[int, ...], held: Sensors) -> Columns:
+        """Return a sensor's x, y and z in its unit, from the values of all."""
+        scale = self._scales.get(sensor)
+        if scale is None:
+            raise WireError(WireFault.ORDER, f"samples of a {sensor} whose scale was not told")
+        first, width = 3 * held.index(sensor), 3 * len(held)
+        x, y, z = ([value / scale for value in values[first + axis :: width]] for axis in range(3))
+        return x, y, z
 
     def _full_boot(self, low: int) -> int:
         """Return the first boot number from the one read on whose low byte is `low`: boots count upwards."""
@@ -203,8 +272,38 @@ class Bracelet:
         (lsb_per_g,) = _fixed("<H", data, SCALE)
         if lsb_per_g == 0:
             raise WireError(WireFault.VALUE, "a scale of 0 LSB per g")
-        self._lsb_per_g = float(lsb_per_g)
-        return DeviceInfo(lsb_per_g=self._lsb_per_g)
+        self._scales[Sensor.ACCELEROMETER] = float(lsb_per_g)
+        return DeviceInfo(lsb_per_g=float(lsb_per_g), sensors=self._sensors)
+
+    def _sensors_told(self, data: bytes) -> DeviceInfo:
+        mask, *scales = _fixed(_SENSORS.format, data, SENSORS)
+        if not mask & 1 or mask >> len(Sensor):
+            raise WireError(WireFault.VALUE, f"sensors {mask:#04x}; bit 0 is set and bits 3–7 are not")
+        sensors = tuple(sensor for bit, sensor in enumerate(Sensor) if mask >> bit & 1)
+        told = {sensor: scale for sensor, scale in zip(_OPTIONAL, scales, strict=True) if sensor in sensors}
+        if 0 in told.values():
+            raise WireError(WireFault.VALUE, "a scale of 0 for a sensor that is there")
+        self._sensors = sensors
+        self._scales = {sensor: scale for sensor, scale in self._scales.items() if sensor not in _OPTIONAL}
+        self._scales |= {sensor: scale / _UNITS[sensor] for sensor, scale in told.items()}
+        return DeviceInfo(sensors=sensors)
+
+
+def _values(data: bytes, held: Sensors) -> tuple[int, ...]:
+    """Return a packet's values as they stand; WireError where they are no whole samples."""
+    n, rest = divmod(len(data) - _HEADER.size, _TRIPLE_BYTES * len(held))
+    if rest or n == 0:
+        why = f"a packet of {len(data)} bytes; {_HEADER.size} + {_TRIPLE_BYTES * len(held)} n are valid, n ≥ 1"
+        raise WireError(WireFault.LENGTH, why)
+    values: tuple[int, ...] = struct.unpack_from(f"<{3 * len(held) * n}h", data, _HEADER.size)
+    return values
+
+
+def _saturated(data: bytes, values: tuple[int, ...], held: Sensors) -> Sequence[int]:
+    """Return which samples hold a value at its limit; the bytes tell at once that there is none."""
+    if _LOWEST not in data and _HIGHEST not in data:
+        return ()
+    return sorted({i // (3 * len(held)) for i, value in enumerate(values) if value in {_I16_MIN, _I16_MAX}})
 
 
 def _rate(data: bytes) -> DeviceInfo:

@@ -58,6 +58,9 @@ async def test_other_parameters_begin_a_segment_and_the_count_never_falls(walk):
         ([{"name": "double_threshold", "params": {"bout": 99}}], "from 2 to 12"),
         ([{"name": "double_threshold", "params": {"beads": 1}}], "no such parameter"),
         ([{"name": "double_threshold"}, {"name": "double_threshold"}], "once"),
+        ([{"name": "double_threshold", "params": {"bout": True}}], "valid"),
+        ([{"name": "autocorrelation", "params": {"t_min": 60, "t_max": 20}}], "t_max"),
+        ([{"name": "double_threshold"}, {"name": "plus_minus", "params": {"half": 3, "score_over": 39}}], "half"),
     ],
 )
 async def test_a_wrong_lineup_is_refused_and_changes_nothing(walk, counters, said):
@@ -66,6 +69,17 @@ async def test_a_wrong_lineup_is_refused_and_changes_nothing(walk, counters, sai
     assert answer.status_code == 422
     assert said in answer.text
     assert (await walk.http.get("api/v1/devices/sim-1/counters")).json() == before
+
+
+async def test_after_a_refusal_the_device_counts_on_and_takes_the_next_lineup(walk):
+    wrong = {"counters": [{"name": "autocorrelation", "params": {"t_min": 60, "t_max": 20}}]}
+    assert (await walk.http.put("api/v1/devices/sim-1/counters", json=wrong)).status_code == 422
+    device = await walk.device()
+    later = await walk.until(lambda now: now["steps"] > device["steps"])
+    assert later["packets"] > device["packets"]
+    beside = {"counters": [{"name": "double_threshold", "preset": "tuned", "params": {}}, {"name": "autocorrelation"}]}
+    assert (await walk.http.put("api/v1/devices/sim-1/counters", json=beside)).status_code == 200
+    await walk.until(lambda now: now["steps"] > later["steps"])
 
 
 async def test_the_feed_tells_steps_of_the_counters_asked_for(walk):

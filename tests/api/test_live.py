@@ -65,22 +65,38 @@ async def test_the_signal_holds_the_thresholds_and_the_peaks_of_the_steps(walk):
 
 
 @pytest.mark.full
-async def test_a_step_is_told_within_a_quarter_second_of_its_peak_then_confirmed_or_retracted():
+async def test_each_step_is_told_within_a_quarter_second_of_its_peak_then_confirmed_or_retracted():
     async with staged(Bracelet(Walker("normal:600", seed=3))) as stage, stage.live() as feed:
         began, heard = time.time(), []
-        while time.time() < began + 14:
+        while time.time() < began + 20:
             heard.append((json.loads(await feed.recv()), time.time()))
-    likely = {m["device_s"]: (m, at) for m, at in heard if m["type"] == "tentative" and m["status"] == "likely"}
-    retracted = {m["device_s"] for m, _ in heard if m["type"] == "tentative" and m["status"] == "retracted"}
-    confirmed = {m["device_s"] for m, _ in heard if m["type"] == "step"}
-    assert len(confirmed) > 8
-    assert not confirmed & retracted
-    assert len(confirmed & set(likely)) >= 0.9 * len(confirmed)  # the rest pass only their own window's threshold
-    newest = max(confirmed)
-    assert {at_s for at_s in likely if at_s < newest} <= confirmed | retracted
-    late_s = [at - datetime.fromisoformat(m["at"]).timestamp() for m, at in likely.values()]
-    assert sorted(late_s)[len(late_s) // 2] <= 0.25
-    assert all(m["at_uncertainty_s"] < 0.1 for m, _ in likely.values())
+    likely, open_s, confirmed = {}, set(), []
+    for message, at in heard:
+        if message["type"] == "tentative" and message["status"] == "likely":
+            likely[message["device_s"]] = (message, at)
+            open_s.add(message["device_s"])
+        elif message["type"] == "tentative":
+            open_s.remove(message["device_s"])
+        elif message["type"] == "step":
+            open_s.remove(message["device_s"])  # none is confirmed that was not told, or that was taken back
+            confirmed.append(message)
+    assert len(confirmed) > 20
+    late_s = [late(*likely[step["device_s"]]) for step in confirmed]
+    assert sorted(late_s)[len(late_s) // 2] <= 0.2
+    # A machine that is busy may hold a packet up; what the service adds beyond that is looked at in tests/tracking.
+    assert sum(one <= 0.25 for one in late_s) >= 0.95 * len(late_s)
+    for step in confirmed[10:]:
+        told = likely[step["device_s"]][0]
+        assert told["heading_deg"] is None  # this bracelet has an accelerometer only
+        assert told["device_uncertainty_s"] == pytest.approx(0.01, abs=0.003)
+        assert told["device_uncertainty_s"] < told["at_uncertainty_s"] < 0.15
+        assert step["at_uncertainty_s"] >= step["device_uncertainty_s"]
+    assert sum(likely[step["device_s"]][0]["passes"] for step in confirmed) >= 0.8 * len(confirmed)
+
+
+def late(message, at):
+    """Seconds from a tentative step's peak, by host time, to its arrival at a reader."""
+    return at - datetime.fromisoformat(message["at"]).timestamp()
 
 
 async def test_subscribing_by_device(walk):

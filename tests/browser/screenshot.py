@@ -1,7 +1,7 @@
 """Take the README's picture of the page: `python tests/browser/screenshot.py [--phone] [--dark] [FILE]`.
 
-It starts the demo, waits until some thirty steps are counted and the plot is full, and writes a PNG of at most
-MOST_BYTES.
+It starts the demo with two counters beside the primary, waits until some thirty steps are counted and the plot is
+full, and writes a PNG of at most MOST_BYTES.
 """
 
 import argparse
@@ -28,7 +28,8 @@ def main() -> int:
     parser.add_argument("--phone", action="store_true", help="390 × 844 instead of 1280 × 800")
     parser.add_argument("--dark", action="store_true", help="the dark theme")
     options = parser.parse_args()
-    with running("demo", "--port", "0", says=r"http://\S+/") as (_, url), running_browser() as browser:
+    beside = ("--beside", "autocorrelation", "--beside", "adaptive_peak")
+    with running("demo", "--port", "0", *beside, says=r"http://\S+/") as (_, url), running_browser() as browser:
         page = browser.new_page(
             viewport=PHONE if options.phone else DESKTOP,
             color_scheme="dark" if options.dark else "light",

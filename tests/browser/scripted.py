@@ -60,7 +60,8 @@ def counting(steps: int, steps_now: int, cadence_spm: float | None = 100.0) -> d
 class ScriptedServer:
     """Serves the page to `page`; each connection to the feed begins with a snapshot of `devices`.
 
-    `refusing` makes new connections close at once; `posts` are the paths posted to, answered with `answer`.
+    `refusing` makes new connections close at once; `posts` are the paths posted to, answered with `answer`. `api` has
+    answers by "METHOD path", each JSON or (status, JSON); `asked` are the requests that it answered, but for GET.
     """
 
     def __init__(self, page: Page, *devices: dict[str, Any]) -> None:
@@ -70,6 +71,8 @@ class ScriptedServer:
         self.answer = 202
         self.health: dict[str, Any] = {"reason": None}
         self.posts: list[str] = []
+        self.api: dict[str, Any] = {"GET api/v1/trials": {"items": [], "next": None}}
+        self.asked: list[tuple[str, Any]] = []
         self.connections = 0
         self.errors: list[str] = []
         self._socket: WebSocketRoute | None = None
@@ -109,6 +112,10 @@ class ScriptedServer:
 
     def _serve(self, route: Route) -> None:
         path = route.request.url.removeprefix(ORIGIN)
+        what = f"{route.request.method} {path}"
+        if what in self.api:
+            self._answer(route, what)
+            return
         if route.request.method == "POST":
             self.posts.append(path)
             route.fulfill(status=self.answer, json={})
@@ -119,3 +126,13 @@ class ScriptedServer:
         file = WEB / (path.removeprefix("web/") or "index.html")
         headers = {"content-security-policy": CONTENT_SECURITY_POLICY}
         route.fulfill(body=file.read_bytes(), content_type=MIME[file.suffix], headers=headers)
+
+    def _answer(self, route: Route, what: str) -> None:
+        if route.request.method != "GET":
+            self.asked.append((what, route.request.post_data_json))
+        answer = self.api[what]
+        status, value = answer if isinstance(answer, tuple) else (200, answer)
+        if value is None:
+            route.fulfill(status=status)
+        else:
+            route.fulfill(status=status, json=value)

@@ -23,7 +23,7 @@ def test_nothing_scrolls_sideways(scripted: Scripted, size: str, scheme: str) ->
         expect(page.locator(".card")).to_have_count(len(devices))
         if len(devices) == 1:
             server.send(state(1, "lost", "the adapter said nothing for quite some time"))
-            expect(page.locator(".notice")).to_be_visible()
+            expect(page.locator("[data-f=notice]")).to_be_visible()
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
@@ -31,7 +31,7 @@ def test_nothing_scrolls_sideways(scripted: Scripted, size: str, scheme: str) ->
 def test_count_and_plot_are_seen_without_scrolling(scripted: Scripted, size: str) -> None:
     width, height = SIZES[size]
     page = scripted(device(), viewport={"width": width, "height": height}).open()
-    for selector in (".count", "canvas"):
+    for selector in (".count", "[data-f=canvas]"):
         box = page.locator(selector).bounding_box()
         assert box is not None
         assert box["y"] + box["height"] <= height
@@ -100,5 +100,6 @@ def test_text_and_curves_stand_out(scheme: str) -> None:
     text = [("ink", "card"), ("ink-soft", "card"), ("ink-soft", "page"), ("ink-soft", "quiet-soft"), ("good", "card"),
             ("good", "good-soft"), ("bad", "bad-soft"), ("busy", "busy-soft"), ("accent-ink", "accent")]  # fmt: skip
     assert [pair for pair in text if contrast(colours[pair[0]], colours[pair[1]]) < 4.5] == []
-    curves = ("signal", "upper", "lower", "step")
+    curves = ("signal", "upper", "lower", "step", *(name for name in colours if name.startswith("mark-")))
+    assert len(curves) > 6
     assert [name for name in curves if contrast(colours[name], colours["card"]) < 3] == []

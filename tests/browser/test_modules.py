@@ -14,8 +14,10 @@ Run = Callable[..., Any]
 
 IMPORTS = """
 const { Trace } = await import("/web/trace.js");
-const { holes, ticks } = await import("/web/plot.js");
+const { ticks } = await import("/web/axis.js");
+const { holes } = await import("/web/plot.js");
 const { waitMs } = await import("/web/feed.js");
+const { Poll } = await import("/web/poll.js");
 const { duration, localTime, percent, zone } = await import("/web/format.js");
 """
 FEED = """
@@ -143,3 +145,40 @@ def test_durations_and_shares_in_words(run: Run) -> None:
     assert [word.replace("\u00a0", " ") for word in words] == [
         "0 s", "0 s", "59 s", "1 min", "59 min", "2 h 5 min", "–", "1.0 %", "50 %",
     ]  # fmt: skip
+
+
+def test_a_poll_puts_one_question_at_a_time_and_ends(run: Run) -> None:
+    body = """
+    let [open, most, asked] = [0, 0, 0];
+    const pause = (ms) => new Promise((done) => { setTimeout(done, ms); });
+    const poll = new Poll(async () => {
+      asked += 1;
+      open += 1;
+      most = Math.max(most, open);
+      await pause(20);
+      open -= 1;
+      return 10_000;
+    });
+    poll.now();
+    poll.now();
+    await pause(100);
+    const twice = asked;
+    poll.stop();
+    await pause(30);
+    return [most, twice, asked];"""
+    assert run(body) == [1, 2, 2]
+
+
+def test_a_likely_step_goes_where_it_is_counted_or_taken_back(run: Run) -> None:
+    body = """
+    const { presence } = await import("/web/trace.js");
+    const trace = new Trace();
+    for (const s of [1, 2, 3]) trace.addTentative({ status: "likely", device_s: s }, 0, "counter");
+    trace.addTentative({ status: "likely", device_s: 1.004 }, 0, "counter");
+    trace.addTentative({ status: "likely", device_s: 4, passes: false }, 0, "counter");
+    trace.addTentative({ status: "retracted", device_s: 2 }, 1000, "counter");
+    trace.addStep({ ordinal: 1, counter: "other", device_s: 3, peak: 1 }, 1000, false);
+    trace.addStep({ ordinal: 2, counter: "counter", device_s: 1, peak: 1 }, 1000);
+    const likely = trace.likely.map((one) => [one.atS, presence(one, 5000)]);
+    return [likely, trace.steps.map(({ wasLikely }) => wasLikely)];"""
+    assert run(body) == [[[2, 0], [3, 1]], [False, True]]

@@ -58,7 +58,8 @@ def test_a_step_of_the_primary_counter_raises_the_count_and_another_counters_doe
     server.send(step(1, 1.0, 999, counter="adaptive_peak"), step(2, 1.0, 8))
     expect(field(page, "steps-now")).to_have_text("41")
     expect(field(page, "steps")).to_have_text("41")
-    expect(field(page, "others")).to_have_text("adaptive peak 999")
+    expect(page.locator(".lane[data-counter=adaptive_peak] b")).to_have_text("999")
+    expect(page.locator(".lane[data-counter=double_threshold] b")).to_have_text("8")
 
 
 def test_battery_packets_and_losses_are_told(scripted: Scripted) -> None:

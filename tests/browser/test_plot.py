@@ -50,7 +50,7 @@ def highest(page: Page, colour: str) -> list[int]:
 
 def second_px(page: Page) -> float:
     """The width of one second."""
-    width: float = page.locator("canvas").evaluate("canvas => canvas.clientWidth")
+    width: float = page.locator("[data-f=canvas]").evaluate("canvas => canvas.clientWidth")
     return (width - LEFT - RIGHT) / 10
 
 
@@ -160,7 +160,7 @@ def test_a_filled_gap_is_no_gap(scripted: Scripted) -> None:
 def test_the_plot_is_sharp_on_a_dense_screen(scripted: Scripted) -> None:
     server, page = still(scripted, device_scale_factor=3, viewport={"width": 390, "height": 844})
     feed(server)
-    sizes = page.locator("canvas").evaluate("c => [c.width / c.clientWidth, c.height / c.clientHeight]")
+    sizes = page.locator("[data-f=canvas]").evaluate("c => [c.width / c.clientWidth, c.height / c.clientHeight]")
     assert sizes == pytest.approx([3, 3], rel=0.01)
 
 

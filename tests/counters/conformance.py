@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite, pi
+from math import ceil, isfinite, pi
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from service.counters.contract import StepCounter
 from service.counters.streaming import COMPILED_FROM
 from service.errors import SnapshotError
-from service.samples import GRID_HZ, Band, SampleBlock, Step, Update
+from service.samples import GRID_HZ, Band, Likely, SampleBlock, Step, Update
 
 Make = Callable[[], StepCounter]
 
@@ -151,6 +151,45 @@ def check_latency(make: Make, signal: Signal) -> None:
     for k in range(len(signal)):
         for step in counter.update(signal.block(k, k + 1)).steps:
             assert k / GRID_HZ - step.at_s <= counter.latency_s + ROUNDING_S
+
+
+def check_told(make: Make, signal: Signal, cuts: Sequence[int], *, within: int | None, anew: bool = False) -> None:
+    """Every step was named likely before, `within` samples after its crest ends on the trace, and never taken back.
+
+    What is named depends on the samples so far, and not on how they were cut. None: a counter that cannot promise it.
+    With `anew` a step may have been taken back, if it was named again.
+    """
+    counter = make()
+    trace: list[float] = []
+    named: list[list[Likely]] = []
+    told: dict[float, int] = {}
+    gone: set[float] = set()
+    for k in range(len(signal)):
+        update = counter.update(signal.block(k, k + 1))
+        from_s = update.trace_from_s - k / GRID_HZ
+        trace += [float(value) for value in update.trace]
+        confirmed = {step.at_s for step in update.steps}
+        now = {at_s for at_s, *_ in update.likely}
+        gone |= {at_s for at_s, *_ in (named[-1] if named else [])} - now - confirmed
+        if anew:
+            gone -= now
+        if within is not None:
+            assert confirmed <= set(told)
+            assert not confirmed & gone
+            for at_s in confirmed:
+                at = ceil((at_s - from_s) * GRID_HZ - ROUNDING_S)
+                end = next(i for i in range(at + 1, k + 1) if trace[i] != trace[at])
+                assert told[at_s] - end < within
+        named.append(list(update.likely))
+        assert update.pending == sum(passes for _, _, passes in update.likely)
+        for at_s, strength, _ in update.likely:
+            assert strength >= 0.0
+            assert at_s < (k + 1) / GRID_HZ
+            told.setdefault(at_s, k)
+    other = make()
+    for a, b in pairwise(cuts):
+        likely = list(other.update(signal.block(a, b)).likely)
+        assert likely == (named[b - 1] if b else [])
 
 
 def check_gap(make: Make, signal: Signal, at: int, gap: int) -> None:

@@ -27,6 +27,12 @@ OUTSIDE = {
 }
 """Walks that a paper's own limits exclude: peaks up to 1.2 g; steps outside 0.3 to 0.8 s, and 0.4 to 1 s."""
 
+TOLD_WITHIN = {("double_threshold", "paper"): 2, "autocorrelation": None}
+"""Samples after a crest's end, 1 if nothing else is said: its N = 2 falls; a period that is not yet over decides.
+
+What fusion sees coming may go and come again when another filter takes over.
+"""
+
 few = settings(max_examples=40, deadline=None)
 
 
@@ -61,6 +67,13 @@ def test_steps_agree_with_each_other_and_with_the_trace(make, signal):
 @given(signal=signals())
 def test_declared_latency_holds(make, signal):
     conformance.check_latency(make, signal)
+
+
+@few
+@given(cut=cut_signals())
+def test_every_step_is_told_soon_and_before_it_is_confirmed(make, cut):
+    within = TOLD_WITHIN.get(make.args, TOLD_WITHIN.get(make.args[0], 1))
+    conformance.check_told(make, *cut, within=within, anew=make.args[0] == "fusion")
 
 
 @few
@@ -107,6 +120,18 @@ def test_foreign_snapshots_are_refused(make):
     others = [registry.make(name, preset) for name, preset in VARIANTS]
     assert len(others) > 1
     conformance.check_foreign_snapshot(make, [o for o in others if o.snapshot()["params"] != state["params"]])
+
+
+def test_the_suite_catches_a_counter_that_confirms_what_it_has_not_told():
+    class Silent:
+        def __new__(cls):
+            counter = registry.make("double_threshold")
+            counter._named = lambda _: []
+            return counter
+
+    signal = Signal(walk(600, 2.0, 0.6))
+    with pytest.raises(AssertionError):
+        conformance.check_told(Silent, signal, [0, 600], within=1)
 
 
 def test_the_suite_catches_a_counter_that_loses_the_packet_border():

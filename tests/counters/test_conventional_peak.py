@@ -32,7 +32,7 @@ def steps_at(params, norm):
     window=st.integers(11, 32),
     half=st.integers(2, 20),
     least_g=st.sampled_from([0.9, 1.05, 1.2]),
-    most_g=st.sampled_from([1.2, 1.5, 3.0]),
+    most_g=st.sampled_from([1.21, 1.5, 3.0]),
     smoothing=st.integers(1, 5),
     bout=st.integers(1, 5),
 )

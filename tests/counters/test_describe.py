@@ -40,7 +40,10 @@ def test_an_unknown_counter_is_told():
 
 def test_the_command_prints_what_is_asked_for(capsys):
     assert main(["counters"]) == 0
-    assert "plus_minus" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "plus_minus" in out
+    assert "Wang, Peng, Zhou" in out
+    assert max(map(len, out.splitlines())) <= 130
     assert main(["counters", "fusion"]) == 0
     assert "height_cm" in capsys.readouterr().out
     assert main(["counters", "abacus"]) == 2

@@ -352,7 +352,7 @@ def test_nothing_is_likely_at_rest():
     counter = build(TUNED)
     counter.update(walk(1.2).block())
     after = counter.update(Signal(still(200)).block(offset=60))
-    assert after.likely == []
+    assert list(after.likely) == []
     assert after.pending == 0
 
 
@@ -362,14 +362,15 @@ def test_likely_steps_come_soon_and_bear_the_time_they_are_confirmed_with():
     confirmed = []
     for k in range(len(signal)):
         update = counter.update(signal.block(k, k + 1))
-        assert update.pending == len(update.likely)
-        for at_s, strength in update.likely:
+        assert update.pending == sum(passes for _, _, passes in update.likely)
+        for at_s, strength, passes in update.likely:
             told.setdefault(at_s, k / GRID_HZ)
-            assert strength > TUNED.rest_g
+            assert not passes or strength > TUNED.rest_g
         confirmed += [step.at_s for step in update.steps]
     assert len(confirmed) >= 13
     assert set(confirmed) <= set(told)
-    assert max(told[at_s] - at_s for at_s in confirmed[1:]) <= 0.25
+    assert max(told[at_s] - at_s for at_s in confirmed[1:]) <= 0.18
+    assert sorted(told[at_s] - at_s for at_s in confirmed)[len(confirmed) // 2] <= 0.13  # before the filter is through
 
 
 def test_clipped_and_huge_values_are_counted_without_harm():

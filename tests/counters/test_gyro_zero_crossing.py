@@ -436,7 +436,7 @@ def test_a_value_that_is_no_number_is_forgotten_within_five_samples():
 def test_latency_is_the_sum_of_what_a_step_waits_for():
     delay_s = -build(PAPER).update(block_of([0.0])).trace_from_s
     assert build(PAPER).latency_s == pytest.approx(delay_s + 1.0)
-    assert build(TUNED).latency_s == pytest.approx(delay_s + 0.5 + 4 * 1.2)
+    assert build(TUNED).latency_s == pytest.approx(delay_s + 0.9 + 4 * 1.5)
     assert build(replace(PAPER, taken_out_s=5.0)).latency_s == pytest.approx(5.02)
 
 

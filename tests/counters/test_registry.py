@@ -68,3 +68,8 @@ def test_the_registry_cannot_be_changed():
     assert isinstance(registry.COUNTERS, MappingProxyType)
     with pytest.raises(TypeError):
         registry.kind("double_threshold").presets["paper"] = TUNED
+
+
+@pytest.mark.parametrize("name", registry.COUNTERS)
+def test_a_counter_itself_says_what_it_needs(name):
+    assert set(registry.make(name).sensors) == registry.kind(name).sensors

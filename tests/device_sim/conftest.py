@@ -10,12 +10,14 @@ from bleak import BleakClient, BleakScanner
 from device_sim.air import LocalAir
 from device_sim.air_tcp import AirServer, RemoteAir
 from device_sim.bracelet import Bracelet
-from service.samples import RawBlock
+from service.samples import ACCELEROMETER_ONLY, RawBlock
 from service.wearables import bracelet as wire
 
 
 class Known:
     """A finite source of n random samples within ±4 g, the same for the same seed."""
+
+    sensors = ACCELEROMETER_ONLY
 
     def __init__(self, n, *, rate_hz=50.0, seed=0):
         self.rate_hz = rate_hz
@@ -70,7 +72,8 @@ class Host:
     async def describe(self):
         infos = {}
         for action in self.decoder.handshake():
-            if not hasattr(action, "data") and type(action).__name__ == "Read":
+            absent = self.client.services.get_characteristic(action.characteristic) is None
+            if type(action).__name__ == "Read" and not (action.optional and absent):
                 data = bytes(await self.client.read_gatt_char(action.characteristic))
                 infos[action.characteristic] = self.decoder.feed(action.characteristic, data)
         return infos

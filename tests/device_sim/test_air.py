@@ -26,6 +26,7 @@ from device_sim.bracelet import Bracelet
 
 class Still:
     rate_hz = 50.0
+    sensors = ("accelerometer",)
     def read(self, n):
         return np.zeros((n, 3))
 

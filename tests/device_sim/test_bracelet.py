@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from device_sim.bracelet import BUFFER_SAMPLES, Bracelet, quantise
 from service.errors import ParameterError
+from service.samples import ACCELEROMETER_ONLY, Sensor
 from service.wearables import bracelet as wire
 
 
@@ -54,6 +55,8 @@ def test_any_chunks_and_mtus_give_every_sample_once(radio_known, n, chunks, mtus
 @pytest.fixture(scope="module")
 def radio_known():
     class Source:
+        sensors = ACCELEROMETER_ONLY
+
         def __init__(self, n, rate_hz=50.0):
             self.rate_hz = rate_hz
             self.acc_g = np.random.default_rng(n).uniform(-7.9, 7.9, (n, 3))
@@ -80,14 +83,14 @@ def test_a_packet_holds_what_fits_but_no_more_than_asked(radio, mtu, packet_samp
 
 
 def test_the_end_of_the_source_sends_the_rest(radio):
-    bracelet = Bracelet(radio.Known(13))
+    bracelet = Bracelet(radio.Known(13), packet_samples=10)
     assert bracelet.measure(20) == 13
     assert bracelet.ended
     assert [len(block) for block in drain(bracelet, host(bracelet))] == [10, 3]
 
 
 def test_what_nobody_takes_is_lost_and_its_numbers_are_not_given_again(radio):
-    bracelet = Bracelet(radio.Known(100))
+    bracelet = Bracelet(radio.Known(100), packet_samples=10)
     bracelet.measure(25)
     bracelet.discard()
     bracelet.measure(10)
@@ -105,6 +108,7 @@ def test_a_full_buffer_loses_the_oldest(radio):
 def test_values_beyond_the_range_are_sent_as_its_limit():
     class Shaken:
         rate_hz = 50.0
+        sensors = ACCELEROMETER_ONLY
 
         def read(self, n):
             return np.tile([9.0, -9.0, 1.0], (n, 1))
@@ -127,7 +131,7 @@ def test_a_reset_counts_from_zero_under_the_next_boot_number(radio):
 
 
 def test_the_index_wraps_and_the_tick_goes_on(radio):
-    bracelet = Bracelet(radio.Endless(), index=2**32 - 10)
+    bracelet = Bracelet(radio.Endless(), index=2**32 - 10, packet_samples=10)
     decoder = host(bracelet)
     bracelet.measure(20)
     before, after = drain(bracelet, decoder)
@@ -158,3 +162,70 @@ def test_parameters_out_of_range_are_refused(radio, wrong):
 def test_a_rate_the_format_cannot_tell_is_refused(radio, rate_hz):
     with pytest.raises(ParameterError):
         Bracelet(radio.Endless(rate_hz=rate_hz))
+
+
+def turned(n, sensors, seed=0):
+    """A source whose samples hold `sensors`, within their ranges."""
+    ranges = {Sensor.ACCELEROMETER: 7.9, Sensor.GYROSCOPE: 36.0, Sensor.MAGNETOMETER: 500.0}
+
+    class Source:
+        rate_hz = 50.0
+        taken = 0
+
+        def read(self, n):
+            block = self.values[self.taken : self.taken + n]
+            self.taken += len(block)
+            return block
+
+    Source.sensors = sensors
+    rng = np.random.default_rng(seed)
+    Source.values = np.hstack([rng.uniform(-ranges[sensor], ranges[sensor], (n, 3)) for sensor in sensors])
+    return Source()
+
+
+def all_values(block):
+    held = [columns for columns in (block.acc_g, block.gyro_rad_s, block.mag_ut) if columns is not None]
+    return np.transpose([column for columns in held for column in columns])
+
+
+@given(sensors=st.sampled_from([tuple(Sensor), tuple(Sensor)[:2]]), mtu=st.integers(29, 517), n=st.integers(1, 90))
+def test_every_sensor_is_sent_to_half_a_bit(sensors, mtu, n):
+    source = turned(n, sensors)
+    bracelet = Bracelet(source)
+    decoder = host(bracelet)
+    assert decoder.feed(wire.SENSORS, bracelet.sensors_value()).sensors == sensors
+    bracelet.measure(n + 1)
+    blocks = drain(bracelet, decoder, mtu)
+    assert [block.sensors for block in blocks] == [sensors] * len(blocks)
+    half_bits = np.repeat([0.5 / 4096, 0.5 / 900, 0.5 / 64][: len(sensors)], 3)
+    assert (np.abs(np.concatenate([all_values(block) for block in blocks]) - source.values) <= half_bits + 1e-12).all()
+
+
+def test_what_has_no_room_is_left_out_of_the_packet_and_comes_back_with_a_larger_mtu():
+    bracelet = Bracelet(turned(40, tuple(Sensor)), packet_samples=10)
+    decoder = host(bracelet)
+    decoder.feed(wire.SENSORS, bracelet.sensors_value())
+    bracelet.measure(20)
+    small = drain(bracelet, decoder, 23)
+    assert [(block.index, len(block), block.sensors) for block in small] == [
+        (i, 1, tuple(Sensor)[:2]) for i in range(20)
+    ]
+    bracelet.measure(20)
+    large = drain(bracelet, decoder, 185)
+    assert [(block.index, len(block), block.sensors) for block in large] == [
+        (20, 9, tuple(Sensor)),
+        (29, 9, tuple(Sensor)),
+    ]
+
+
+def test_a_turn_beyond_the_range_is_sent_as_its_limit():
+    source = turned(10, tuple(Sensor)[:2])
+    source.values[3, 4] = 40.0
+    bracelet = Bracelet(source)
+    decoder = host(bracelet)
+    decoder.feed(wire.SENSORS, bracelet.sensors_value())
+    bracelet.measure(10)
+    (block,) = drain(bracelet, decoder)
+    assert list(block.saturated) == [3]
+    assert block.gyro_rad_s[1][3] == 32767 / 900
+    assert bracelet.statistics().saturated == 1

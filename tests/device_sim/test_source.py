@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from device_sim.source import RecordingSource, Source, WalkerSource
 from service.errors import ParameterError
 from service.recordings import Recording
+from service.samples import Sensor
 
 
 def recorded(n=10, rate_hz=50.0, **changes):
@@ -81,3 +82,16 @@ def test_a_walker_is_a_source():
     assert source.rate_hz == 25
     assert source.read(999).shape == (250, 3)
     assert source.true_steps_until(10.0) == 20
+
+
+def test_a_recording_plays_what_it_has_of_the_sensors_asked_for():
+    gyro, mag = np.full((10, 3), 2.0), np.full((10, 3), 30.0)
+    has_all, no_gyro = recorded(gyro_rad_s=gyro, mag_ut=mag), recorded(mag_ut=mag)
+    assert RecordingSource(has_all).sensors == (Sensor.ACCELEROMETER,)
+    assert RecordingSource(has_all).read(1).shape == (1, 3)
+    everything = RecordingSource(has_all, sensors=tuple(Sensor), rate_hz=25.0)
+    assert everything.sensors == tuple(Sensor)
+    assert everything.read(1)[0, 2:7] == pytest.approx([1.0, 2.0, 2.0, 2.0, 30.0])
+    without = RecordingSource(no_gyro, sensors=tuple(Sensor), loop=True)
+    assert without.sensors == (Sensor.ACCELEROMETER, Sensor.MAGNETOMETER)
+    assert without.read(25).shape == (25, 6)

@@ -33,6 +33,7 @@ def test_parameters_go_to_their_counter():
         (["double_threshold"], "tuned", ["bout=3"], ParameterError, "NAME.KEY=V"),
         (["double_threshold"], "tuned", ["double_threshold.bout"], ParameterError, "NAME.KEY=V"),
         (["double_threshold"], "tuned", [".bout=3"], ParameterError, "NAME.KEY=V"),
+        (["autocorrelation"], "tuned", ["autocorrelation.period=stride"], ParameterError, "t_min"),
     ],
 )
 def test_what_is_wrong_is_said(names, preset, params, error, said):
@@ -72,6 +73,22 @@ def test_a_path_is_shown_as_it_was_asked_for(tmp_path, monkeypatch):
     assert [f.shown for f in find(["set/"])[0]] == ["set/1.npz"]
     monkeypatch.chdir(tmp_path / "set")
     assert [(f.shown, f.dataset) for f in find(["1.npz"])[0]] == [("1.npz", "set")]
+
+
+def test_a_file_is_found_once_however_often_it_is_named(tmp_path, monkeypatch):
+    save(walk(1), tmp_path / "set" / "1.npz")
+    monkeypatch.chdir(tmp_path)
+    found, _ = find(["set/1.npz", "./set/1.npz", "set", "set/../set", str(tmp_path)])
+    assert [f.shown for f in found] == ["set/1.npz"]
+
+
+def test_the_data_set_of_a_link_is_the_folder_it_was_put_in(tmp_path):
+    there = save(walk(1), tmp_path / "elsewhere" / "1.npz")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "one.npz").symlink_to(there)
+    (tmp_path / "ours").symlink_to(tmp_path / "elsewhere")
+    for path in ("mine", "mine/one.npz", "ours", "ours/../mine"):
+        assert [f.dataset for f in find([f"{tmp_path}/{path}"])[0]] == [path.split("/")[-1 if ".." in path else 0]]
 
 
 def test_texts_that_are_no_recordings_are_passed_over_unless_named(tmp_path):

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from evaluation.lossless import live_steps
 from evaluation.made import still, walk
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from device_sim.source import RecordingSource
 from service.counters import registry
 from service.errors import CounterError, ParameterError, RecordingError
-from service.evaluation.counting import count, grid_block, raw_block, sensors
+from service.evaluation.counting import MIN_RATE_HZ, count, grid_block, raw_block, sensors
 from service.recordings import evenly_spaced, stated_rate_hz
 from service.recordings.even import MAX_SAMPLES
+from service.recordings.recording import median_rate_hz
 from service.samples import Sensor
 
 VARIANTS = [(name, preset) for name in registry.COUNTERS for preset in registry.COUNTERS[name].presets]
@@ -52,6 +53,7 @@ def test_at_50_hz_the_grid_is_the_file():
 @given(st.integers(0, 1000), st.floats(0.3, 8), st.sampled_from([12.5, 25, 31.25, 50, 52.083333, 100]))
 def test_packets_plain_python_and_numba_give_the_same_steps(seed, seconds, rate_hz):
     made = jittered(seed, seconds, rate_hz)
+    assume(median_rate_hz(made.t_s) >= MIN_RATE_HZ)  # of a few samples most may come late
     live = live_steps(made, VARIANTS, n=1 + seed % 30)
     for variant in VARIANTS:
         for fast in (True, False):

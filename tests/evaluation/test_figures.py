@@ -1,6 +1,7 @@
 """The figures: one file a name, drawn, the same again; their numbers where a picture cannot be read."""
 
 import dataclasses
+import itertools
 import sys
 from importlib import resources
 
@@ -9,12 +10,15 @@ import numpy as np
 import pytest
 from evaluation.made import save, still, walk
 
+from service.counters import registry
 from service.errors import ParameterError
 from service.evaluation.choices import find
 from service.evaluation.figures import agreement, bracelet, canvas, draw, phones
-from service.evaluation.figures.sources import cut, middle, sources, times_s
+from service.evaluation.figures.events import Kind, busiest, events
+from service.evaluation.figures.sources import PEOPLE, cut, middle, sources, step_maxima_g, times_s
 from service.evaluation.papers import PAPERS
-from service.evaluation.rows import Row
+from service.evaluation.papers.report import Bar
+from service.evaluation.rows import Choice, Row
 from service.samples import GRID_HZ
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -78,7 +82,7 @@ def test_every_figure_is_written_once_and_is_no_blank(tmp_path, seen, monkeypatc
     for name, axes in seen.items():
         assert axes[-1].get_xlabel() or name in {"accuracy", "timing"}, name
         assert all(each.get_ylabel() for each in axes), name
-        assert any(mark in axes[-1].get_ylabel() for mark in ("/", "counted")), name
+        assert all("/" in each.get_ylabel() for each in axes), name
 
 
 def test_the_same_numbers_give_the_same_bytes(tmp_path, of):
@@ -141,11 +145,76 @@ def test_thresholds_lie_over_each_other_and_steps_above(of):
     assert np.allclose(at_peak, [step.peak for step in view.steps])
 
 
-def test_step_maxima_tell_a_walk_from_a_run(of):
-    walking, running = phones.step_maxima_g(of.walk), phones.step_maxima_g(of.run)
-    assert len(walking) == of.walk.true_steps
+def test_step_maxima_tell_a_walk_from_a_run_and_are_pooled(of):
+    walking, running = of.walks.maxima_g, of.runs.maxima_g
+    assert len(step_maxima_g(of.walk)) == of.walk.true_steps
+    assert len(walking) == len(running) == PEOPLE * 100
     assert ((walking >= phones.WALK_G) & (walking <= phones.RUN_G)).mean() > 0.9
     assert (running > phones.RUN_G).mean() > 0.9
+
+
+def test_every_recorded_walk_adds_its_step_maxima(tmp_path):
+    for number, seconds in enumerate((10.0, 20.0)):
+        save(walk(seconds), tmp_path / "mine" / f"{number}.npz", activity="walk")
+    pool = sources(find([str(tmp_path)])[0], 32.0).walks
+    assert (len(pool.maxima_g), pool.pieces, pool.synthetic) == (20 + 40, 2, False)
+
+
+def test_what_was_evaluated_is_drawn_and_said(tmp_path, of, seen):
+    rows = [row(counter="fusion"), row(preset="tuned", params={"axes": "xz", "bout": 5}, changed=("axes",))]
+    chosen = bracelet.evaluated(rows)
+    assert (chosen.preset, chosen.overrides) == ("tuned", {"axes": "xz"})
+    assert bracelet.evaluated([row(counter="fusion")]) == bracelet.PUBLISHED
+    bracelet.thresholds(tmp_path / "t.png", of.walk, chosen)
+    assert "preset tuned axes=xz" in seen["t"][0].get_figure().get_suptitle()
+    axes = {preset: bracelet.counted(of.walk, Choice(counter=bracelet.NAME, preset=preset, overrides={})).axes
+            for preset in ("paper", "tuned")}  # fmt: skip
+    assert axes == {"paper": "√(X² + Z²)", "tuned": "norm"}
+
+
+@pytest.fixture(scope="module")
+def watched(of):
+    return events(of.sensed[0])
+
+
+def test_taken_extrema_are_the_counters_own(of, watched):
+    """Every step of the counter is a peak that stood; taken ones come by turns, and those replaced did not stand."""
+    counter = registry.make("fusion", "paper")
+    steps = [*counter.update(of.sensed[0].signal).steps, *counter.finish().steps]
+    taken = [event for event in watched.events if event.kind is Kind.TAKEN]
+    start = of.sensed[0].signal.start
+    assert steps
+    assert {round(step.at_s * GRID_HZ) - start for step in steps} <= {event.at for event in taken}
+    heights = dict(zip(((round(s.at_s * GRID_HZ) - start) for s in steps), (s.peak for s in steps), strict=True))
+    assert all(heights.get(event.at, event.norm_g) == event.norm_g for event in taken)
+    assert all(watched.norm_g[event.at] == event.norm_g for event in watched.events if event.at >= 0)
+    rises = [b.norm_g > a.norm_g for a, b in itertools.pairwise(taken)]
+    assert all(a != b for a, b in itertools.pairwise(rises))
+
+
+def test_rejected_extrema_lie_in_a_reject_region_and_replacing_ones_in_an_update_region(watched):
+    rejected = [event for event in watched.events if event.kind is Kind.REJECTED]
+    replaced = [event for event in watched.events if event.kind is Kind.REPLACED]
+    assert rejected
+    assert replaced
+    regions = [event.reject for event in watched.events if event.reject]
+    assert all(any(first < event.at <= to for first, to in regions) for event in rejected)
+    stood = [event for event in watched.events if event.kind in {Kind.TAKEN, Kind.REPLACED}]
+    later = dict(itertools.pairwise(stood))
+    assert all(event.update == (event.at, later[event].at) for event in replaced)
+    assert all(abs(later[event].norm_g - 1) > abs(event.norm_g - 1) for event in replaced)
+
+
+def test_the_stretch_with_most_decisions_is_shown(tmp_path, of, watched, seen, monkeypatch):
+    monkeypatch.setattr(phones, "events", lambda _: watched)
+    part, worth = busiest(watched, 300)
+    assert part.stop - part.start == 300
+    assert worth > 0
+    phones.regions(tmp_path / "regions.png", of.sensed)
+    told = [text.get_text() for text in seen["regions"][0].get_legend().get_texts()]
+    inside = [event for event in watched.events if part.start <= event.at < part.stop]
+    for kind, (_, _, text) in phones._MARKS.items():
+        assert f"{text} ({sum(event.kind is kind for event in inside)})" in told
 
 
 def test_a_gait_cycle_is_two_steps(tmp_path, of, seen):
@@ -171,17 +240,62 @@ def test_bars_stand_at_the_mean_accuracy_of_each_set(tmp_path, seen):
     assert np.isnan(heights[1][1])
 
 
-def test_cadence_is_true_steps_a_minute(tmp_path, seen):
+def test_an_accuracy_below_0_is_written_where_its_bar_would_be(tmp_path, seen):
+    agreement.accuracy(tmp_path / "bars.png", [row(), row(path="b", dataset="other", steps=250)])
+    assert [text.get_text() for text in seen["bars"][0].texts] == ["−50 %"]
+
+
+def test_published_bars_stand_around_ours(tmp_path, seen):
+    bars = [
+        Bar(group=group, method=method, ours=ours, published=99.0, real=real)
+        for group, method, ours, real in (
+            ("walking", "one", 90.0, False), ("walking", "two", -5.0, False), ("running", "two", 80.0, False),
+            ("pocket (set)", "one", 70.0, True),
+        )
+    ]  # fmt: skip
+    agreement.against_published(tmp_path / "bars.png", bars)
+    walkers, recordings = seen["bars"]
+    drawn = [[(bar.get_x(), bar.get_height()) for bar in bars] for bars in walkers.containers]
+    ours, published = (drawn[0] + drawn[2]), (drawn[1] + drawn[3])
+    assert [at for at, _ in ours] == [at for at, _ in published]
+    assert [height for _, height in ours] == [90.0, 0.0, 80.0]
+    assert {height for _, height in published} == {99.0}
+    assert [text.get_text() for text in walkers.texts] == ["−5 %"]
+    assert [text.get_text() for text in recordings.get_xticklabels()] == ["pocket (set)"]
+
+
+def test_a_papers_figure_has_its_claims(tmp_path, seen, of, monkeypatch):
+    monkeypatch.setattr(draw, "sources", lambda *_: of)
+    monkeypatch.setattr(draw, "SIGNALS", {})
+    bar = Bar(group="walking", method="one", ours=90.0, published=99.0, real=False)
+    draw.write(tmp_path, [row()], [], lsb_per_g=32.0, bars=[bar])
+    assert [text.get_text() for text in seen["accuracy"][0].get_xticklabels()] == ["walking"]
+
+
+def test_cadence_is_true_steps_a_minute_and_every_counter_has_a_panel(tmp_path, seen):
     agreement.error_by_cadence(tmp_path / "cadence.png", ROWS)
-    line = seen["cadence"][0].lines[0]
-    assert (line.get_xdata()[0], line.get_ydata()[0]) == (100.0, -5.0)
+    first, second = seen["cadence"]
+    assert (first.get_title(loc="right"), second.get_title(loc="right")) == ("double_threshold", "adaptive_peak")
+    assert (first.lines[0].get_xdata()[0], first.lines[0].get_ydata()[0]) == (100.0, -5.0)
+    assert (first.lines[1].get_xdata(), first.lines[1].get_ydata()) == ([105.0], [2.5])
+    assert first.get_ylim() == second.get_ylim()
 
 
-def test_times_are_of_5000_samples_and_stand_beside_the_published(tmp_path, seen):
+def test_panels_of_agreement_share_their_scale_and_say_the_unit(tmp_path, seen):
+    agreement.bland_altman(tmp_path / "ba.png", ROWS)
+    first, second = seen["ba"]
+    assert first.get_ylim() == second.get_ylim()
+    assert first.get_ylabel() == second.get_ylabel() == "counted − true / steps"
+
+
+@pytest.mark.parametrize(("there", "how"), [(True, "compiled by numba"), (False, "plain Python, numba is missing")])
+def test_times_are_of_5000_samples_and_stand_beside_the_published(tmp_path, seen, monkeypatch, there, how):
+    monkeypatch.setattr(agreement, "available", lambda: there)
     agreement.timing(tmp_path / "time.png", [row(), row(counter="adaptive_peak", elapsed_s=0.003)])
     here, published = seen["time"][0].containers
     assert [bar.get_height() for bar in here] == pytest.approx([0.001 * 5 / 3, 0.005])
     assert [bar.get_height() for bar in published] == [0.036]
+    assert how in here.get_label()
 
 
 def test_the_guide_lists_every_figure_and_paper():

@@ -135,7 +135,8 @@ def test_a_summary_by_hand():
         ]
     )
     assert (together.recordings, together.hours) == (5, 1.0)
-    assert (together.true, together.counted, together.error) == (400, 426, 26)
+    assert (together.true, together.counted, together.error) == (400, 420, 20)
+    assert (together.false, together.untold) == (6, 1000)
     assert (together.accuracy, together.mape) == (90, 10)
     assert together.pooled_accuracy == 90
     assert together.bias == 5
@@ -148,13 +149,21 @@ def test_a_summary_by_hand():
 
 def test_a_summary_of_nothing_has_no_figures():
     empty = summarise([])
-    assert (empty.recordings, empty.true, empty.error, empty.hours) == (0, 0, 0, 0)
+    assert (empty.recordings, empty.hours) == (0, 0)
+    assert {empty.true, empty.counted, empty.error, empty.false, empty.untold} == {None}
     assert {empty.accuracy, empty.mape, empty.bias, empty.false_per_hour, empty.f1, empty.blind_f1} == {None}
 
 
 @given(st.lists(st.tuples(st.integers(0, 500), st.integers(1, 500)), min_size=1, max_size=8))
 def test_bias_is_within_the_error_and_a_perfect_count_has_none(counts):
     found = summarise(Score(counted=counted, true=true, duration_s=1) for counted, true in counts)
+    assert found.bias == pytest.approx(100 * found.error / found.true)
     assert abs(found.bias) <= 100 - found.pooled_accuracy + 1e-9
     assert found.accuracy == pytest.approx(100 - found.mape)
     assert (found.mape == 0) == all(counted == true for counted, true in counts)
+
+
+@given(st.lists(st.tuples(st.integers(0, 500), st.none() | st.integers(0, 500)), max_size=8))
+def test_every_counted_step_is_in_one_column(counts):
+    found = summarise(Score(counted=counted, true=true, duration_s=1) for counted, true in counts)
+    assert sum(n or 0 for n in (found.counted, found.false, found.untold)) == sum(counted for counted, _ in counts)

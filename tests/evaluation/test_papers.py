@@ -110,7 +110,7 @@ def test_every_claim_of_the_texts_is_there():
     percents = {name: {claim.percent for claim in PAPERS[name].claims} for name in NAMES}
     assert percents["wang2018"] == {91.88}
     assert percents["chen2015"] == {99, 97, 70, 50}
-    assert percents["jayalath2013"] == {96, 94.59, 95, 90}
+    assert percents["jayalath2013"] == {96, 94.59, 95, 90, 96.36, 95.45}
     assert percents["khedr2017"] == {99.6, 99.1, 99.47}
 
 
@@ -124,6 +124,21 @@ def test_every_claim_is_about_rows_of_its_tables(name):
             if claim.rows in row.label and claim.method in {m.label for m in table_of(name, number).methods}
         ]
         assert found, claim
+
+
+def test_published_rows_on_stairs_claim_the_least_mean_of_their_direction():
+    for direction, percent in (("up stairs", 96.36), ("down stairs", 95.45)):
+        (claim,) = (c for c in PAPERS["jayalath2013"].claims if c.rows == direction)
+        printed = [row.published for row in table_of("jayalath2013", 4).rows if direction in row.label]
+        assert {of["zero crossing"].accuracy for of in printed if of} == {percent} == {claim.percent}
+        assert (claim.of, claim.tables) == ("least mean", (4,))
+
+
+def test_the_worst_case_stands_in_the_column_it_is_compared_with():
+    row = next(row for row in table_of("khedr2017", 1).rows if row.label.startswith("typing, slow"))
+    (claim,) = (claim for claim in PAPERS["khedr2017"].claims if claim.rows == "typing, slow")
+    assert row.published["fusion"].accuracy == claim.percent == 99.1
+    assert (claim.of, row.published["fusion"].low) == ("mean", None)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -384,6 +399,28 @@ def test_a_report_counts_the_recordings_it_is_given(tmp_path):
     assert "Real recordings of the conditions" in made.text()
     assert told[-1] == (walkers(made_paper()),) * 2
     assert [row["dataset"] for row in made.as_json() if row["table"] == "real recordings"] == ["mine"] * 4
+
+
+@pytest.mark.usefixtures("_in_one_process")
+def test_two_axes_say_nothing_of_a_recording_of_the_magnitude(tmp_path):
+    made = walk(30.0)
+    turned = dataclasses.replace(made, acc_g=made.acc_g[:, [2, 0, 1]])
+    both = dataclasses.replace(made, acc_g=np.add(made.acc_g, (0.1, 0.2, 0.0)))
+    for name, recording in (("magnitude", turned), ("axes", both)):
+        save(recording, tmp_path / name / "a.npz", placement="wrist", activity="walk")
+    found = recordings([str(tmp_path)])
+    report_of = asyncio.run(report(made_paper(), found, jobs=1, lsb_per_g=32.0, progress=lambda *_: None))
+    methods_of = {(m.dataset, m.method.label) for m in report_of.measured}
+    assert methods_of == {("magnitude", "three axes"), ("axes", "three axes"), ("axes", "two axes")}
+
+
+def test_bars_are_what_has_a_published_figure(gyroscope):
+    bars = gyroscope.bars
+    assert [(bar.group, bar.published) for bar in bars[:2]] == [("flat land", 96), ("flat land, least walker", 94.59)]
+    assert [bar.ours for bar in bars] == [
+        ours for claim in gyroscope.paper.claims if (ours := claimed(claim, gyroscope.results)) is not None
+    ]
+    assert not any(bar.real for bar in bars)
 
 
 def test_a_report_says_where_nothing_fits(tmp_path):

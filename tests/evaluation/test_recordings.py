@@ -27,6 +27,8 @@ DATASETS = (
     "sensorwatch_magonly", "voisard_lowback",
 )  # fmt: skip
 
+PRESETS = ("paper", "tuned")
+
 COLUMNS = {
     "eth2023": "eth2023_wrist",
     "eth2022": "eth2022_wrist",
@@ -48,12 +50,12 @@ def all_of(folder):
 
 def variants_for(block):
     has = sensors(block)
-    return [(name, "tuned") for name, kind in registry.COUNTERS.items() if kind.sensors <= has]
+    return [(name, preset) for name, kind in registry.COUNTERS.items() if kind.sensors <= has for preset in PRESETS]
 
 
 @pytest.mark.parametrize("dataset", DATASETS)
 def test_live_plain_and_compiled_counts_are_the_same(recordings, dataset):
-    """Every counter that the recording has the sensors for; packets carry the values unrounded."""
+    """Every counter that the recording has the sensors for, with both presets; packets carry the values unrounded."""
     for path in all_of(recordings / dataset):
         recording = read(path)
         block = grid_block(recording)
@@ -103,7 +105,7 @@ def documented(name):
     return {COLUMNS[column.strip()]: float(cell) for column, cell in zip(names[1:], figures[1:], strict=True)}
 
 
-@pytest.mark.parametrize("preset", ["paper", "tuned"])
+@pytest.mark.parametrize("preset", PRESETS)
 def test_evaluate_gives_the_figures_of_the_docstring(recordings, tmp_path, preset):
     out, wanted = tmp_path / "rows.json", documented(preset)
     words = ["evaluate", *(str(recordings / dataset) for dataset in wanted), "--preset", preset, "--json", str(out)]

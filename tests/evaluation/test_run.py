@@ -12,11 +12,12 @@ from service.errors import ParameterError
 from service.evaluation.choices import Found, choices, find
 from service.evaluation.json_file import checked_path, write_json
 from service.evaluation.rows import Row
-from service.evaluation.run import evaluate, failed_rows, rows_of, saturated
+from service.evaluation.run import evaluate, failed_rows, rows_of
 
 KEYS = [
     "path", "dataset", "placement", "activity", "rate_hz", "counter", "preset", "params", "true_steps", "steps",
-    "error", "duration_s", "samples", "elapsed_s", "tp", "fp", "fn",
+    "error", "duration_s", "samples", "elapsed_s", "saturated",
+    "calibration", "tp", "fp", "fn",
 ]  # fmt: skip
 """The contract with tools."""
 
@@ -117,18 +118,12 @@ def test_a_missing_sensor_is_told_and_the_other_counters_count(tmp_path):
     assert "needs gyroscope" in second.error
 
 
-def test_a_saturated_recording_is_marked():
+def test_a_saturated_recording_is_marked(tmp_path):
     made = walk(10, swing_g=1.5)
     clipped = dataclasses.replace(made, acc_g=np.clip(made.acc_g, -2, 2))
-    assert saturated(clipped)
-    assert not saturated(made)
-    assert not saturated(still(10))
-    assert not saturated(dataclasses.replace(made, acc_g=np.clip(made.acc_g, -1.3, 1.3)))
-    spike = still(10)
-    spike.acc_g[100:102, 0] = -2.0
-    assert not saturated(spike)
-    spike.acc_g[102, 0] = -2.0
-    assert saturated(spike)
+    assert one(save(made, tmp_path / "a.npz")).as_json()["saturated"] is False
+    assert one(save(clipped, tmp_path / "b.npz")).as_json()["saturated"] is True
+    assert one(tmp_path / "absent.npz").as_json()["saturated"] is None
 
 
 async def test_rows_come_in_order_from_several_processes_and_progress_is_told(tmp_path, bare, monkeypatch):

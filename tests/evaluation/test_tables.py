@@ -30,13 +30,22 @@ def test_a_table_by_hand():
         row("e/c.npz", 3, 0, dataset="e"),
     ]
     assert table(rows, "dataset", lambda of: of.dataset) == (
-        "dataset  counter  rec.  hours  true  steps  error  accuracy %  pooled %  MAPE %  bias %  false/h"
-        "  precision  recall     F1  blind\n" + "─" * 129 + "\n"
-        "d        one         2   0.20   400    425    +25       92.50     91.25     7.5    +6.2         "
-        "      0.818   0.900  0.857  0.524\n"
+        "dataset  counter  rec.  hours  true  steps  error  accuracy %  pooled %  MAPE %  bias %  false  false/h"
+        "  precision  recall     F1  blind\n" + "─" * 136 + "\n"
+        "d        one         2   0.20   400    425    +25       92.50     91.25     7.5    +6.2"
+        + " "
+        * 16
+        + "      0.818   0.900  0.857  0.524\n"
         "         two         1   0.10   100    100     +0      100.00    100.00     0.0    +0.0\n"
-        "e        one         1   0.10     0      3     +3" + " " * 45 + "30"
+        "e        one         1   0.10" + " " * 64 + "3       30"
     )
+
+
+def test_steps_and_error_leave_out_recordings_that_hold_none():
+    header, line = cells(table([row(), row("d/b.npz", 30, 0)], "dataset", lambda of: of.dataset))
+    found = dict(zip(" ".join(header).replace(" %", "%").split(), line, strict=True))
+    assert (found["true"], found["steps"], found["error"], found["bias%"]) == ("100", "95", "-5", "-5.0")
+    assert (found["false"], found["false/h"]) == ("30", "300")
 
 
 def test_figures_that_no_line_has_are_left_out():
@@ -46,11 +55,22 @@ def test_figures_that_no_line_has_are_left_out():
     assert "F1" not in header
 
 
-def test_unknown_truth_is_no_zero_and_the_counts_are_listed():
-    text = report([row(true=None, steps=77)])
-    assert "–" in text
-    assert "d/a.npz: 77 (one)" in text
-    assert "accuracy %" not in text
+def test_unknown_truth_leaves_true_and_error_empty_and_the_steps_there():
+    header, line = cells(table([row(true=None, steps=77)], "dataset", lambda of: of.dataset))
+    assert header == ["dataset", "counter", "rec.", "hours", "true", "steps", "error"]
+    assert line == ["d", "one", "1", "0.10", "–", "77", "–"]
+
+
+def test_unknown_truth_beside_known_ones_has_its_own_column():
+    header, line = cells(table([row(), row("d/b.npz", 77, None)], "dataset", lambda of: of.dataset))
+    found = dict(zip(" ".join(header).replace(" %", "%").split(), line, strict=True))
+    assert (found["true"], found["steps"], found["error"], found["untold"]) == ("100", "95", "-5", "77")
+
+
+def test_many_of_unknown_truth_are_in_the_json():
+    rows = [row(f"d/{k}.npz", true=None) for k in range(EACH_RECORDING_UP_TO + 1)]
+    assert f"unknown for {EACH_RECORDING_UP_TO + 1} recordings; --json" in report(rows)
+    assert "--json" not in report(rows[:-1])
 
 
 def test_a_report_groups_by_what_there_is():

@@ -8,7 +8,7 @@ import pytest
 from links.conformance import CHECKS, Bench, take
 
 from device_sim.air import LocalAir
-from device_sim.bracelet import Bracelet
+from device_sim.bracelet import PACKET_SAMPLES, Bracelet
 from device_sim.gait import Walker
 from device_sim.gatt import Start
 from service.errors import LinkError, LinkFault
@@ -60,7 +60,7 @@ async def test_what_was_read_comes_first_then_data_without_a_hole():
     kinds = [packet.characteristic for packet in packets]
     assert kinds[:5] == [wire.DEVICE_ID, wire.BOOT, wire.SCALE, wire.RATE, wire.CLOCK]
     indices = numbered(packets)
-    assert indices == list(range(0, 10 * len(indices), 10))
+    assert indices == list(range(0, PACKET_SAMPLES * len(indices), PACKET_SAMPLES))
 
 
 async def test_a_lost_link_says_so():
@@ -73,7 +73,7 @@ async def test_a_lost_link_says_so():
 
 async def test_a_silent_link_is_dropped(monkeypatch):
     monkeypatch.setattr(ble, "SILENCE_S", 0.2)
-    async with on_air() as (gatt, sighting, backend), link_to(sighting, backend) as link:
+    async with on_air(speed=8) as (gatt, sighting, backend), link_to(sighting, backend) as link:
         await take(link, 12)
         gatt.silence()
         with pytest.raises(LinkError) as silent:

@@ -2,7 +2,7 @@
 
 CWA: openmovement, Docs/ax3/ax3-technical.md (a header «MD» of 1024 bytes, blocks «AX» of 512, little-endian, the words
 of a block sum to 0). GT3X: github.com/actigraph/GT3X-File-Format (README, info.txt, PARAMETERS 21,
-ACTIVITY 0, ACTIVITY2 26).
+ACTIVITY 0, ACTIVITY2 26); ACTIVITY3 27 is known from github.com/actigraph/pygt3x.
 """
 
 import io
@@ -59,8 +59,11 @@ def cwa_block(number, counts, at_s, code, rate_hz):
     return body + struct.pack("<H", -total & 0xFFFF)
 
 
-def gt3x(acc_g, *, rate_hz=30, missing_s=(), activity2=False, subject="P7"):
-    """Return a zip with one record a second of `acc_g`; the seconds in `missing_s` are left out, as sleep mode does."""
+def gt3x(acc_g, *, rate_hz=30, missing_s=(), activity2=(), kind=26, subject="P7"):
+    """Return a zip with one record a second of `acc_g`; the seconds in `missing_s` are left out, as sleep mode does.
+
+    Those in `activity2` are records of ActiGraph's newer `kind`.
+    """
     start = int(START.timestamp())
     # The rate in parameter space 1, number 10; the scale in space 0, number 55, as 0.5 × 2⁹ = 256 counts per g.
     log = record(21, start, struct.pack("<HHIHHI", 1, 10, rate_hz, 0, 55, 0x09400000))
@@ -69,7 +72,7 @@ def gt3x(acc_g, *, rate_hz=30, missing_s=(), activity2=False, subject="P7"):
         rows = counts[second * rate_hz : (second + 1) * rate_hz]
         if second in missing_s:
             continue
-        log += record(26, start + second, rows.astype("<i2").tobytes()) if activity2 else record(
+        log += record(kind, start + second, rows.astype("<i2").tobytes()) if second in activity2 else record(
             0, start + second, twelve_bits(rows[:, [1, 0, 2]]))  # fmt: skip
     log += record(0, start + len(counts) // rate_hz, b"\x01")  # the dock's USB event, no sample
     info = f"Serial Number: MOS2E00000000\nSample Rate: {rate_hz}\nStart Date: 638061246000000000\nStop Date: 0\n"

@@ -85,9 +85,19 @@ def test_actigraph_seconds_asleep_are_a_hole(tmp_path):
     assert np.allclose(recording.t_s[58:62], [58 / 30, 59 / 30, 4.0, 4 + 1 / 30], atol=1e-6)
 
 
-def test_records_that_the_library_passes_over_are_no_empty_recording(tmp_path):
+@pytest.mark.parametrize("seconds", [(0, 1, 2), (1,)])
+@pytest.mark.parametrize(("kind", "name"), [(26, "ACTIVITY2"), (27, "ACTIVITY3")])
+def test_a_file_that_the_library_would_read_in_part_is_refused(tmp_path, seconds, kind, name):
+    """Without the check, one such record in the middle is a hole, and nobody is told."""
+    with pytest.raises(
+        RecordingError, match=f"it holds {name} records, which actfast would leave out.*export it as CSV"
+    ):
+        read(written(tmp_path, gt3x(walk(90), activity2=seconds, kind=kind), "a.gt3x"))
+
+
+def test_a_file_without_acceleration_is_no_empty_recording(tmp_path):
     with pytest.raises(RecordingError, match="no acceleration that actfast knows; export it as CSV"):
-        read(written(tmp_path, gt3x(walk(90), activity2=True), "a.gt3x"))
+        read(written(tmp_path, gt3x(walk(90), missing_s=(0, 1, 2)), "a.gt3x"))
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,46 @@ def test_what_is_wrong_in_a_file_is_named(tmp_path, text, says):
     assert says in error.value.why
 
 
+WITH_ALL = "t,ax,ay,az,gx,gy,gz,mx,my,mz,s\n" + "".join(
+    f"{20 * k},0,0,1,{90 * k},0,-90,{k},20,-40,{step}\n" for k, step in enumerate([0, 1, 0, 0, 1])
+)
+ALL = "time=t,x=ax,y=ay,z=az,gx=gx,gy=gy,gz=gz,mx=mx,my=my,mz=mz,steps=s"
+
+
+def test_every_sensor_and_the_steps_may_be_named(tmp_path):
+    recording = read(written(tmp_path, WITH_ALL), mapping=column_mapping(ALL, "g", "ms", "deg/s"))
+    assert recording.gyro_rad_s[2] == pytest.approx([np.pi, 0, -np.pi / 2])
+    assert recording.mag_ut[3].tolist() == [3, 20, -40]
+    assert recording.step_t_s.tolist() == [0.02, 0.08]
+    assert recording.true_steps == 2
+    radians = read(written(tmp_path, WITH_ALL), mapping=column_mapping(ALL, "g", "ms"))
+    assert radians.gyro_rad_s[2].tolist() == [180, 0, -90]
+
+
+@pytest.mark.parametrize(
+    ("told", "step_t_s"),
+    [
+        ([0, 1, 0, 0, 1], [0.02, 0.08]),
+        ([1, 0, 0, 0, 0], [0.0]),
+        ([7, 8, 8, 9, 9], [0.02, 0.06]),
+        ([0, 0, 2, 2, 2], [0.04, 0.04]),
+        ([0, 0, 0, 0, 0], []),
+    ],
+    ids=str,
+)
+def test_steps_are_marks_or_a_running_number(tmp_path, told, step_t_s):
+    text = "t,x,y,z,s\n" + "".join(f"{20 * k},0,0,1,{step}\n" for k, step in enumerate(told))
+    recording = read(written(tmp_path, text), mapping=column_mapping("time=t,x=x,y=y,z=z,steps=s", time_unit="ms"))
+    assert recording.step_t_s.tolist() == pytest.approx(step_t_s)
+
+
+@pytest.mark.parametrize("told", [[0, 2, 0], [0, 0.5, 1], [0, 5, 90]], ids=str)
+def test_steps_that_are_neither_are_refused(tmp_path, told):
+    text = "t,x,y,z,s\n" + "".join(f"{20 * k},0,0,1,{step}\n" for k, step in enumerate(told))
+    with pytest.raises(RecordingError, match="steps: "):
+        read(written(tmp_path, text), mapping=column_mapping("time=t,x=x,y=y,z=z,steps=s", time_unit="ms"))
+
+
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "t,note,ax,ay,az\nsoon,,n,n,n\n", "\0\1"])
 def test_a_text_without_the_columns_is_passed_over(tmp_path, text):
     """An empty file is not: to read it says what is wrong."""
@@ -134,6 +174,9 @@ def test_a_text_without_the_columns_is_passed_over(tmp_path, text):
         ("",),
         ("x=ax,y=ay,z=az", "ft/s2"),
         ("x=ax,y=ay,z=az", "g", "h"),
+        ("x=ax,y=ay,z=az", "g", "s", "rpm"),
+        ("x=ax,y=ay,z=az,gx=gx",),
+        ("x=ax,y=ay,z=az,mx=mx,mz=mz",),
     ],
 )
 def test_words_that_name_nothing_are_refused(words):

@@ -7,7 +7,7 @@ import pytest
 
 from service.errors import RecordingError
 from service.recordings import Recording
-from service.recordings.recording import median_rate_hz, merge_repeated_stamps
+from service.recordings.recording import median_rate_hz, merge_repeated_stamps, spread_stamps
 
 
 def made(**changes):
@@ -80,10 +80,41 @@ def test_motion_may_move_the_median(norm_g):
 
 
 def test_repeated_stamps_keep_the_first_sample():
-    t_s, (kept, none) = merge_repeated_stamps(np.array([0.0, 1.0, 1.0, 2.0]), np.arange(4.0), None)
-    assert t_s.tolist() == [0, 1, 2]
-    assert kept.tolist() == [0, 1, 3]
+    stamps_s = np.array([0.0, 1.0, 1.0, *range(2, 20)])
+    t_s, (kept, none) = merge_repeated_stamps(stamps_s, np.arange(21.0), None)
+    assert t_s.tolist() == list(range(20))
+    assert kept.tolist() == [0, 1, *range(3, 21)]
     assert none is None
+
+
+@pytest.mark.parametrize("round_to_s", [0.05, 0.1, 1.0])
+def test_stamps_of_blocks_are_spread_over_their_samples(round_to_s):
+    true_s = np.arange(1000) / 100
+    stamps_s = np.round(np.floor(true_s / round_to_s + 1e-6) * round_to_s, 3)
+    t_s, (kept,) = merge_repeated_stamps(stamps_s, true_s)
+    assert np.allclose(t_s, true_s, atol=1e-9)
+    assert np.array_equal(kept, true_s)
+    assert median_rate_hz(t_s) == 100
+
+
+def test_a_pause_between_blocks_stays_one():
+    stamps_s = np.repeat([0.0, 0.1, 0.2, 7.0, 7.1], 5)
+    t_s, _ = merge_repeated_stamps(stamps_s, np.arange(25.0))
+    assert t_s[10:16] == pytest.approx([0.2, 0.22, 0.24, 0.26, 0.28, 7.0])
+    assert t_s[-1] == pytest.approx(7.18)
+
+
+def test_samples_written_twice_are_taken_once():
+    stamps_s, values = np.repeat(np.arange(50) / 50, 2), np.repeat(np.arange(50.0), 2)
+    t_s, (kept,) = merge_repeated_stamps(stamps_s, values)
+    assert t_s.tolist() == (np.arange(50) / 50).tolist()
+    assert kept.tolist() == list(range(50))
+
+
+@pytest.mark.parametrize("stamps_s", [[0, 0, 0, 0], [0, 0, 2, 2, 1, 1], [0, 0, np.nan, 1, 1]], ids=str)
+def test_what_says_no_time_or_falls_is_not_spread(stamps_s):
+    stamps_s = np.array(stamps_s, dtype=float)
+    assert spread_stamps(stamps_s, np.arange(float(len(stamps_s)))) is stamps_s
 
 
 def test_columns_of_another_length_are_left_to_the_check():
@@ -95,3 +126,9 @@ def test_columns_of_another_length_are_left_to_the_check():
 @pytest.mark.parametrize(("t_s", "rate_hz"), [([0, 0.02, 0.04, 0.9], 50), ([], 1), ([0], 1), ([1, 0], 1)], ids=str)
 def test_the_median_spacing_says_the_rate(t_s, rate_hz):
     assert median_rate_hz(np.array(t_s, dtype=float)) == pytest.approx(rate_hz)
+
+
+def test_a_rate_is_no_longer_than_it_needs_to_be():
+    assert median_rate_hz(np.arange(1000) / 100 + 1.6e9) == pytest.approx(100, abs=1e-4)
+    assert median_rate_hz(np.arange(1000) / 100) == 100
+    assert median_rate_hz(np.array([0, 1e9])) == 1e-9

@@ -2,6 +2,7 @@
 
 import importlib
 
+import numpy as np
 import pytest
 
 from service.signals import compiled as module
@@ -21,6 +22,21 @@ def test_callees_are_compiled_too():
     fast = compiled(kernel)
     assert fast is not kernel
     assert fast(3.0) == kernel(3.0)
+
+
+def first(values):
+    return values[0]
+
+
+def give_back(values):
+    first(values)
+    return values * 2
+
+
+def test_a_kernel_that_makes_an_array_does_not_compile():
+    numba = pytest.importorskip("numba")
+    with pytest.raises(numba.core.errors.NumbaError):
+        compiled(give_back)(np.zeros(3))
 
 
 def test_without_numba_the_plain_function_runs(monkeypatch):

@@ -148,3 +148,73 @@ def test_all_sensors_share_one_grid():
     samples, _ = Timebase(25).feed(raw)
     assert samples.acc_g == samples.gyro_rad_s == samples.mag_ut
     assert len(samples) == 19
+
+
+def test_how_well_a_moment_is_known_is_half_a_sample_and_what_the_ticks_leave_open():
+    untold = Timebase(50)
+    run(untold, [10] * 10, 50, tick=False)
+    assert untold.uncertainty_s == 0.01
+    slow = Timebase(12.5)
+    run(slow, [10] * 10, 12.5, tick=False)
+    assert slow.uncertainty_s == 0.04
+    steady, drifting = Timebase(50), Timebase(50)
+    run(steady, [10] * 100, 50)
+    run(drifting, [10] * 30, 51)
+    assert 0.01 < steady.uncertainty_s < 0.012
+    assert drifting.uncertainty_s > 0.02
+
+
+def held(index, n, *sensors):
+    """A block at 25 Hz whose named sensors all hold the same values."""
+    column = [value(i) for i in range(index, index + n)]
+    tick = int(1024 * (index - index % TICK_EVERY) / 25) % WRAP
+    columns = dict.fromkeys(("acc_g", *sensors), (column, column, column))
+    return RawBlock(boot=1, index=index, tick=tick, **columns)
+
+
+GYRO, MAG = "gyro_rad_s", "mag_ut"
+
+
+@given(st.lists(st.tuples(st.integers(1, 30), st.sets(st.sampled_from([GYRO, MAG])), st.integers(0, 40)), max_size=12))
+def test_sensors_may_come_and_go_and_keep_to_the_grid_of_the_acceleration(blocks):
+    """Whatever is lost between: each block holds what came, as long as its acceleration; nothing is emitted twice."""
+    mixed, plain, index, next_k = Timebase(25), Timebase(25), 0, 0
+    for n, sensors, lost in blocks:
+        samples, gap = mixed.feed(held(index, n, *sensors))
+        alone, gap_alone = plain.feed(held(index, n))
+        assert (samples.start, samples.acc_g, gap) == (alone.start, alone.acc_g, gap_alone)
+        assert samples.start >= next_k
+        next_k = samples.start + len(samples)
+        for name in (GYRO, MAG):
+            columns = getattr(samples, name)
+            assert (columns is not None) == (name in sensors)
+            assert columns is None or {len(column) for column in columns} == {len(samples)}
+        index += n + lost
+
+
+def test_a_sensor_that_comes_anew_begins_at_its_first_value():
+    timebase = Timebase(25)
+    timebase.feed(held(0, 10))
+    samples, _ = timebase.feed(held(10, 3, GYRO))
+    between = (value(10) + value(11)) / 2
+    assert samples.gyro_rad_s[0][:3] == pytest.approx([value(10), value(10), between])
+    assert samples.acc_g[0][:3] == pytest.approx([(value(9) + value(10)) / 2, value(10), between])
+
+
+def test_what_a_sensor_last_said_is_forgotten_with_it():
+    timebase = Timebase(25)
+    for block_ in (held(0, 10, GYRO), held(10, 5)):
+        timebase.feed(block_)
+    samples, _ = timebase.feed(held(15, 3, GYRO))
+    assert len(samples.gyro_rad_s[0]) == len(samples) == 6
+    assert samples.gyro_rad_s[0][0] == value(15)
+
+
+@given(cut=st.integers(1, 5))
+def test_a_snapshot_holds_every_sensor(cut):
+    blocks = [held(0, 10, GYRO), held(10, 10), held(20, 10, GYRO, MAG), held(45, 10, MAG), held(55, 10), held(65, 9)]
+    whole, resumed = Timebase(25), Timebase(25)
+    expected = [whole.feed(one) for one in blocks]
+    first = [resumed.feed(one) for one in blocks[:cut]]
+    resumed = Timebase.restored(json.loads(json.dumps(resumed.snapshot())))
+    assert first + [resumed.feed(one) for one in blocks[cut:]] == expected

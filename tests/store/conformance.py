@@ -85,6 +85,9 @@ async def check_a_step_is_one_whatever_its_number(reopen):
         await store.append(Batch(session=KEY, entries=(made.step(7, at_s=1.5), made.step(8, at_s=2.0))))
         await store.append(Batch(session=KEY, entries=(made.step(9, at_s=9.0, count=1),)))
         assert [told.ordinal for told in await steps(store)] == [1, 2, 8, 9]
+        relabelled = dataclasses.replace(made.step(8, at_s=2.0), at_ns=5, uncertainty_s=9.0)
+        await store.append(Batch(session=KEY, entries=(relabelled,)))
+        assert (await steps(store, after=2))[0] == made.step(8, at_s=2.0), "what was told first stays"
         assert (await session_of(store)).steps == {"double_threshold": 4}
         (device,) = await store.read(lambda reader: reader.devices())
     assert (device.first_ordinal, device.last_ordinal) == (1, 9)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from store import made
 
-from service.samples import Step, StepCounted
+from service.samples import Heading, Step, StepCounted
 from service.store import codec, database
 from service.store.reader import Reader
 from service.store.schema import MIGRATIONS
@@ -86,9 +86,10 @@ def test_pages_of_any_size_from_anywhere_give_the_rest(start, stop, limit):
         lower=st.none() | FLOATS,
     ),
     st.integers(0, 2**32 - 1),
+    st.none() | st.builds(Heading, deg=FLOATS, uncertainty_deg=FLOATS, is_line=st.booleans()),
 )
-def test_a_step_comes_back_bit_for_bit(step, boot):
-    told = StepCounted(counter="fusion", boot=boot, steps=1, step=step)
+def test_a_step_comes_back_bit_for_bit(step, boot, heading):
+    told = StepCounted(counter="fusion", boot=boot, steps=1, step=step, uncertainty_s=0.011, heading=heading)
     entry = LogEntry(ordinal=1, at_ns=made.SINCE_NS, uncertainty_s=0.1, run=3, told=told)
     with memory() as (scribe, reader):
         written(scribe, [Batch(session=KEY, entries=(entry,))] * 2)

@@ -1,14 +1,13 @@
 """The Tracker: a pure fold over packets. Bad, repeated, late and absent ones are counted, and none stops it."""
 
 import json
-from dataclasses import replace
 
 import pytest
-from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described
+from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described, tick_at
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.errors import CounterError
+from service.errors import CounterError, ParameterError
 from service.samples import (
     GRID_HZ,
     Counting,
@@ -153,7 +152,7 @@ def flipped(data, offset, bit):
     return mask
 
 
-OURS = [wire.DATA, wire.CLOCK, wire.RATE, wire.SCALE, wire.BOOT, wire.DEVICE_ID]
+OURS = [wire.DATA, wire.CLOCK, wire.RATE, wire.SCALE, wire.BOOT, wire.DEVICE_ID, wire.SENSORS]
 
 
 @given(values=st.lists(st.tuples(st.sampled_from(OURS), st.binary(max_size=60)), max_size=20), at=st.integers(0, 20))
@@ -231,7 +230,7 @@ def test_samples_before_the_rate_are_bad_packets():
 
 
 class GyroscopeCounter(MetronomeCounter):
-    """A counter that needs what the device does not send."""
+    """A counter that needs what the device does not send, and says it late."""
 
     def update(self, block):
         raise CounterError(f"needs a gyroscope, not {len(block)} samples of acceleration")
@@ -244,6 +243,18 @@ def test_a_counter_without_its_sensor_says_so_and_the_others_count_on():
     run(plain, data_packets([10] * 10))
     assert tracker.counter_faults == {"gyroscope": "needs a gyroscope, not 10 samples of acceleration"}
     assert tracker.steps == {**plain.steps, "gyroscope": 0}
+
+
+def test_samples_at_their_limit_are_counted_once():
+    def packet(index, values):
+        counts = [(value, 0, 4096) for value in values]
+        sent = wire.DataPacket(boot=1, index=index, tick=tick_at(index), counts=counts)
+        return Packet(characteristic=wire.DATA, data=wire.encode(sent), at_ns=0)
+
+    tracker = ready()
+    run(tracker, [packet(0, [0, 99_999, 0, -99_999]), packet(2, [0, -99_999, 32_766, 32_767])])
+    assert tracker.tally.samples == 6
+    assert tracker.tally.samples_saturated == 3
 
 
 def test_a_device_is_described_once_a_change():
@@ -273,7 +284,7 @@ class Foresight(MetronomeCounter):
         update = super().update(block)
         ahead = [k / GRID_HZ for k in range(self._next, self._next + 10) if k % EVERY == 0]
         false = [1.3] if 1.0 <= self._next / GRID_HZ < 1.5 else []
-        return replace(update, likely=[(at_s, 0.5) for at_s in (*ahead, *false)])
+        return update._replace(likely=[(at_s, 0.5, True) for at_s in (*ahead, *false)])
 
 
 def test_likely_steps_are_told_then_confirmed_or_retracted():
@@ -281,7 +292,8 @@ def test_likely_steps_are_told_then_confirmed_or_retracted():
     events = run(tracker, [*described(), *data_packets([10] * 10)])
     told = [(event.at_s, event.interval_s, event.retracted) for event in only(events, Tentative)]
     assert told == [
-        (0.5, None, False),
+        (0.0, None, False),  # confirmed at first sight
+        (0.5, 0.5, False),
         (1.0, 0.5, False),
         (1.3, pytest.approx(0.3), False),
         (1.5, pytest.approx(0.2), False),
@@ -297,7 +309,7 @@ class Half(MetronomeCounter):
 
     def update(self, block):
         update = super().update(block)
-        return replace(update, steps=tuple(step for step in update.steps if round(step.at_s * 2) % 2 == 0))
+        return update._replace(steps=tuple(step for step in update.steps if round(step.at_s * 2) % 2 == 0))
 
 
 def test_counters_run_side_by_side_on_one_stream():
@@ -321,6 +333,23 @@ def test_another_primary_begins_a_segment_and_the_count_goes_on():
     tracker.change_counters({"metronome": MetronomeCounter, "half": Half}, primary="metronome")
     run(tracker, data_packets([10] * 10, start=200))
     assert tracker.total == 10
+
+
+def test_counters_that_cannot_be_built_change_nothing():
+    def broken():
+        raise ParameterError("t_min", 60, "at most t_max")
+
+    refused, plain = ready(), ready()
+    for tracker in (refused, plain):
+        run(tracker, data_packets([10] * 7))
+    before = refused.snapshot()
+    with pytest.raises(ParameterError):
+        refused.change_counters({"half": Half, "broken": broken}, primary="half")
+    assert refused.snapshot() == before
+    assert run(refused, data_packets([10] * 13, start=70)) == run(plain, data_packets([10] * 13, start=70))
+    assert refused.snapshot() == plain.snapshot()
+    (segment,) = only(refused.change_counters({"half": Half}, primary="half"), Segmented)
+    assert segment.steps == plain.total
 
 
 def test_a_counter_that_stays_goes_on_without_a_break():

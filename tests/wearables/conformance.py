@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from service.errors import WireError
-from service.samples import DeviceInfo, RawBlock
+from service.samples import DeviceInfo, RawBlock, Sensor
 from service.wearables import bracelet
 from service.wearables.contract import Read, Subscribe, Wearable, Write
 
@@ -21,6 +21,8 @@ class Case:
     data: tuple[str, bytes]
 
 
+NINE_AXES = bracelet.DataPacket(boot=7, index=128, tick=99, counts=[range(9), range(-9, 0)], sensors=tuple(Sensor))
+
 WEARABLES = {
     "bracelet": Case(
         make=bracelet.Bracelet,
@@ -29,7 +31,16 @@ WEARABLES = {
             bracelet.DATA,
             bracelet.encode(bracelet.DataPacket(boot=7, index=128, tick=99, counts=[(1, 2, 3), (4, 5, 6)])),
         ),
-    )
+    ),
+    "bracelet with all sensors": Case(
+        make=bracelet.Bracelet,
+        said={
+            bracelet.SENSORS: bracelet.encode_sensors(tuple(Sensor), lsb_per_rad_s=900, lsb_per_100_ut=6400),
+            bracelet.SCALE: bracelet.encode_scale(4096),
+            bracelet.BOOT: bracelet.encode_boot(7),
+        },
+        data=(bracelet.DATA, bracelet.encode(NINE_AXES)),
+    ),
 }
 
 
@@ -61,8 +72,11 @@ def check_data(case):
     """A good value gives samples whose columns are equally long."""
     block = ready(case).feed(*case.data)
     assert isinstance(block, RawBlock)
-    assert len({len(column) for column in block.acc_g}) == 1
+    held = [columns for columns in (block.acc_g, block.gyro_rad_s, block.mag_ut) if columns is not None]
+    assert len(held) == len(block.sensors)
+    assert {len(column) for columns in held for column in columns} == {len(block)}
     assert len(block) > 0
+    assert all(0 <= at < len(block) for at in block.saturated)
 
 
 def check_foreign(case):

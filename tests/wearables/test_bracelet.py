@@ -1,5 +1,6 @@
 """The bracelet's wire format: round trips, and nothing but samples or a WireError from any bytes."""
 
+import math
 import struct
 
 import pytest
@@ -7,33 +8,56 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.errors import WireError, WireFault
-from service.samples import DeviceInfo
+from service.samples import ACCELEROMETER_ONLY, DeviceInfo, Sensor
 from service.wearables import bracelet as wire
 
+A, G, M = Sensor
+HELD = [(A,), (A, G), (A, M), (A, G, M)]
+"""What the samples of a packet may hold."""
 i16 = st.integers(-32768, 32767)
-samples = st.lists(st.tuples(i16, i16, i16), min_size=1, max_size=84)
 
 
-def ready(*, boot=1, lsb_per_g=4096):
+def samples(sensors):
+    return st.lists(st.tuples(*[i16] * 3 * len(sensors)), min_size=1, max_size=wire.samples_per_packet(517, sensors))
+
+
+packets = st.sampled_from(HELD).flatmap(lambda sensors: st.tuples(st.just(sensors), samples(sensors)))
+
+
+def ready(*, boot=1, lsb_per_g=4096, sensors=tuple(Sensor), lsb_per_rad_s=900, lsb_per_100_ut=6400):
     decoder = wire.Bracelet()
+    if sensors != ACCELEROMETER_ONLY:
+        told = wire.encode_sensors(sensors, lsb_per_rad_s=lsb_per_rad_s, lsb_per_100_ut=lsb_per_100_ut)
+        decoder.feed(wire.SENSORS, told)
     decoder.feed(wire.SCALE, wire.encode_scale(lsb_per_g))
     decoder.feed(wire.BOOT, wire.encode_boot(boot))
     return decoder
 
 
 @given(
-    counts=samples,
+    packet=packets,
     index=st.integers(0, 2**32 - 1),
     tick=st.integers(0, 2**40),
     boot=st.integers(0, 2**32 - 1),
     history=st.booleans(),
-    lsb_per_g=st.integers(1, 65535),
+    lsb=st.tuples(*[st.integers(1, 65535)] * 3),
 )
-def test_round_trip(counts, index, tick, boot, history, lsb_per_g):
-    packet = wire.DataPacket(boot=boot, index=index, tick=tick, counts=counts, history=history)
-    block = ready(boot=boot, lsb_per_g=lsb_per_g).feed(wire.DATA, wire.encode(packet))
+def test_round_trip(packet, index, tick, boot, history, lsb):
+    sensors, counts = packet
+    sent = wire.DataPacket(boot=boot, index=index, tick=tick, counts=counts, history=history, sensors=sensors)
+    decoder = ready(boot=boot, lsb_per_g=lsb[0], lsb_per_rad_s=lsb[1], lsb_per_100_ut=lsb[2])
+    block = decoder.feed(wire.DATA, wire.encode(sent))
     assert (block.boot, block.index, block.tick) == (boot, index, tick & 0xFFFF)
-    assert list(zip(*block.acc_g, strict=True)) == [tuple(v / lsb_per_g for v in xyz) for xyz in counts]
+    assert (block.sensors, block.history) == (sensors, history)
+    per_unit = {A: lsb[0], G: lsb[1], M: lsb[2] / 100}
+    units = [per_unit[sensor] for sensor in sensors for _ in "xyz"]
+    held = [columns for columns in (block.acc_g, block.gyro_rad_s, block.mag_ut) if columns is not None]
+    columns = [column for columns in held for column in columns]
+    assert list(zip(*columns, strict=True)) == [
+        tuple(value / unit for value, unit in zip(sample, units, strict=True)) for sample in counts
+    ]
+    at_limit = [i for i, sample in enumerate(counts) if {-32768, 32767} & {*sample}]
+    assert list(block.saturated) == at_limit
 
 
 def test_the_table_in_bytes():
@@ -41,11 +65,49 @@ def test_the_table_in_bytes():
     assert wire.encode(packet) == bytes.fromhex("01 ff 04030201 0706 0100 ffff 0010")
 
 
-@pytest.mark.parametrize(("mtu", "n"), [(23, 2), (185, 29), (247, 39), (517, 84)])
-def test_samples_per_packet(mtu, n):
-    assert wire.samples_per_packet(mtu) == n
-    packet = wire.DataPacket(boot=0, index=0, tick=0, counts=[(0, 0, 0)] * n)
+def test_the_table_of_all_sensors_in_bytes():
+    counts = [(1, -1, 4096, 900, 0, -2, 6400, 0, 3)]
+    packet = wire.DataPacket(boot=1, index=128, tick=7, counts=counts, sensors=(A, G, M))
+    data = bytes.fromhex("61 01 80000000 0700 0100 ffff 0010 8403 0000 feff 0019 0000 0300")
+    assert wire.encode(packet) == data
+    assert wire.encode_sensors((A, G, M), lsb_per_rad_s=900, lsb_per_100_ut=6400) == bytes.fromhex("07 8403 0019")
+    block = ready().feed(wire.DATA, data)
+    assert (block.gyro_rad_s[0], block.mag_ut[0]) == ([1.0], [100.0])
+
+
+@pytest.mark.parametrize(
+    ("mtu", "sensors", "held", "n"),
+    [
+        (23, (A,), (A,), 2),
+        (185, (A,), (A,), 29),
+        (247, (A,), (A,), 39),
+        (517, (A,), (A,), 84),
+        (23, (A, G), (A, G), 1),
+        (23, (A, M), (A, M), 1),
+        (185, (A, G), (A, G), 14),
+        (23, (A, G, M), (A, G), 1),
+        (28, (A, G, M), (A, G), 1),
+        (29, (A, G, M), (A, G, M), 1),
+        (185, (A, G, M), (A, G, M), 9),
+        (517, (A, G, M), (A, G, M), 28),
+    ],
+)
+def test_what_a_packet_holds(mtu, sensors, held, n):
+    assert wire.packet_sensors(mtu, sensors) == held
+    assert wire.samples_per_packet(mtu, sensors) == n
+    packet = wire.DataPacket(boot=0, index=0, tick=0, counts=[(0,) * 3 * len(held)] * n, sensors=held)
     assert len(wire.encode(packet)) <= mtu - wire.ATT_HEADER
+    assert len(wire.encode(packet)) + 6 * len(held) > mtu - wire.ATT_HEADER
+
+
+def test_a_sample_is_as_wide_as_its_sensors():
+    with pytest.raises(ValueError, match="three values"):
+        wire.encode(wire.DataPacket(boot=0, index=0, tick=0, counts=[(0,) * 6], sensors=(A, G, M)))
+
+
+def test_the_ranges_hold_a_fast_arm_and_several_earths():
+    assert math.radians(2000) < 32767 / wire.DEFAULT_LSB_PER_RAD_S
+    assert 32767 / wire.DEFAULT_LSB_PER_100_UT * 100 > 5 * 65
 
 
 def test_values_outside_the_range_are_sent_as_its_limit():
@@ -55,11 +117,14 @@ def test_values_outside_the_range_are_sent_as_its_limit():
 
 
 @given(
-    uuid=st.sampled_from([wire.DATA, wire.SCALE, wire.RATE, wire.BOOT, wire.DEVICE_ID, wire.CLOCK, wire.BATTERY_LEVEL]),
+    uuid=st.sampled_from(
+        [wire.DATA, wire.SCALE, wire.RATE, wire.BOOT, wire.DEVICE_ID, wire.CLOCK, wire.SENSORS, wire.BATTERY_LEVEL]
+    ),
     data=st.binary(max_size=512),
+    sensors=st.sampled_from(HELD),
 )
-def test_any_bytes_give_a_value_or_a_wire_error(uuid, data):
-    decoder = ready()
+def test_any_bytes_give_a_value_or_a_wire_error(uuid, data, sensors):
+    decoder = ready(sensors=sensors)
     try:
         assert decoder.feed(uuid, data) is not None
     except WireError as error:
@@ -74,6 +139,13 @@ def test_any_bytes_give_a_value_or_a_wire_error(uuid, data):
         (wire.DATA, bytes.fromhex("01 01 00000000 0000 0000 0000 00"), WireFault.LENGTH),
         (wire.DATA, bytes.fromhex("02 01 00000000 0000 0000 0000 0000"), WireFault.VERSION),
         (wire.DATA, bytes.fromhex("81 01 00000000 0000 0000 0000 0000"), WireFault.VERSION),
+        (wire.DATA, bytes.fromhex("61 01 00000000 0000") + bytes(12), WireFault.LENGTH),
+        (wire.DATA, bytes.fromhex("21 01 00000000 0000") + bytes(18), WireFault.LENGTH),
+        (wire.SENSORS, bytes.fromhex("07 8403"), WireFault.LENGTH),
+        (wire.SENSORS, bytes.fromhex("06 8403 0019"), WireFault.VALUE),
+        (wire.SENSORS, bytes.fromhex("0f 8403 0019"), WireFault.VALUE),
+        (wire.SENSORS, bytes.fromhex("03 0000 0019"), WireFault.VALUE),
+        (wire.SENSORS, bytes.fromhex("05 8403 0000"), WireFault.VALUE),
         (wire.SCALE, struct.pack("<H", 0), WireFault.VALUE),
         (wire.RATE, struct.pack("<H", 99), WireFault.VALUE),
         (wire.CLOCK, struct.pack("<IQ", 100, 0), WireFault.VALUE),
@@ -95,6 +167,20 @@ def test_data_before_the_scale_is_refused():
     packet = wire.DataPacket(boot=0, index=0, tick=0, counts=[(0, 0, 0)])
     with pytest.raises(WireError, match="before the scale"):
         wire.Bracelet().feed(wire.DATA, wire.encode(packet))
+
+
+@pytest.mark.parametrize("held", HELD[1:])
+def test_values_without_a_scale_are_refused(held):
+    packet = wire.DataPacket(boot=0, index=0, tick=0, counts=[(0,) * 3 * len(held)], sensors=held)
+    with pytest.raises(WireError, match="whose scale was not told"):
+        ready(sensors=(A,)).feed(wire.DATA, wire.encode(packet))
+
+
+@pytest.mark.parametrize("has", HELD)
+def test_what_it_measures_is_known_once_the_scale_is(has):
+    """A bracelet that does not say so, as old firmware, has an accelerometer only."""
+    decoder = ready(sensors=has)
+    assert decoder.feed(wire.SCALE, wire.encode_scale(4096)) == DeviceInfo(lsb_per_g=4096.0, sensors=has)
 
 
 def test_a_reset_counts_the_boot_upwards():

@@ -5,10 +5,13 @@
  * second. What a screen reader hears is rate-limited: counts every ANNOUNCE_MS, states at once.
  */
 
+import { of, request } from "./api.js";
 import { Card } from "./card.js";
+import { CountersDialog } from "./counters_dialog.js";
 import { Devices } from "./devices.js";
 import { Feed } from "./feed.js";
 import { duration, localTime, whole, zone } from "./format.js";
+import { Trials } from "./trials.js";
 
 const ANNOUNCE_MS = 10_000;
 const SECOND_MS = 1_000;
@@ -18,6 +21,8 @@ const ANSWER_MS = 2_000;
 const $ = (id) => document.getElementById(id);
 const devices = new Devices();
 const cards = new Map();
+const counters = new CountersDialog($("counters"));
+const trials = new Trials($("trials"));
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 const server = { state: "connecting", retryAtMs: null, lostAt: null, known: false };
 const spoken = { atMs: 0, text: "", states: new Map() };
@@ -61,27 +66,29 @@ function setText(id, text) {
 }
 
 async function act(device, verb) {
-  const url = new URL(`api/v1/devices/${encodeURIComponent(device.id)}/${verb}`, document.baseURI);
-  try {
-    const answer = await fetch(url, { method: "POST", signal: AbortSignal.timeout(SECOND_MS * 10) });
-    return answer.ok ? null : `The server refused to ${verb}: ${answer.status} ${answer.statusText}`;
-  } catch {
-    return `The server did not answer the request to ${verb}. Try again when it is back.`;
-  } finally {
-    dirty = true;
-  }
+  const { status, error } = await request(of(device, verb), { method: "POST" });
+  dirty = true;
+  if (error === null) return null;
+  return status === 0 ? `The server did not answer the request to ${verb}. Try again when it is back.`
+    : `The server refused to ${verb}: ${status} ${error}`;
+}
+
+function choose(device) {
+  counters.open(device, (sentence) => {
+    $("announce").textContent = sentence;
+  });
 }
 
 function showDevices() {
   const entries = devices.all;
   for (const [entry, card] of cards) {
     if (entries.includes(entry)) continue;
-    card.element.remove();
+    card.close();
     cards.delete(entry);
   }
   for (const entry of entries) {
     if (!cards.has(entry)) {
-      const card = new Card($("card"), entry.trace, act);
+      const card = new Card($("card"), entry.trace, { act, choose });
       cards.set(entry, card);
       $("devices").append(card.element);
       card.restyle();
@@ -92,21 +99,14 @@ function showDevices() {
   if (empty && $("empty").hidden) setTimeout(showTrouble);
   $("empty").hidden = !empty;
   $("devices").classList.toggle("several", entries.length > 1);
+  trials.show(entries.map(({ device }) => device));
   document.title = entries.length === 1 ? `${whole(entries[0].device.steps_now)} steps · steplink` : "steplink";
-}
-
-async function got(path) {
-  try {
-    return await (await fetch(new URL(path, document.baseURI), { signal: AbortSignal.timeout(ANSWER_MS) })).json();
-  } catch {
-    return null;
-  }
 }
 
 /** While there is no bracelet, say whether the server's Bluetooth is the reason. */
 async function showTrouble() {
   if ($("empty").hidden || server.state !== "open") return;
-  const health = await got("healthz");
+  const { value: health } = await request("healthz", { timeoutMs: ANSWER_MS });
   $("trouble").hidden = !health?.reason;
   setText("trouble", health?.reason ? `Bluetooth does not work on the server: ${health.reason}` : "");
 }

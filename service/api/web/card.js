@@ -4,7 +4,10 @@
  * A card writes only what changed, so that selection, focus and a screen reader's place stay where they are.
  */
 
+import { CalibrationPanel } from "./calibration_panel.js";
 import { UNKNOWN, duration, localTime, measured, percent, plural, whole } from "./format.js";
+import { Lanes, glyph } from "./lanes.js";
+import { look } from "./looks.js";
 import { Plot } from "./plot.js";
 
 /** State in words; the icon has the same name. */
@@ -25,36 +28,66 @@ export class Card {
   element;
   #fields = {};
   #plot;
-  #act;
+  #lanes;
+  #trace;
+  #panel = new CalibrationPanel();
+  #tell;
+  #device = null;
   #asked = null;
   #error = null;
   #before = null;
   #steps = null;
 
-  /** `act(device, verb)` asks the server to "connect" or "disconnect" and resolves to an error's text or null. */
-  constructor(template, trace, act) {
+  /**
+   * `tell.act(device, verb)` asks the server to "connect" or "disconnect" and resolves to an error's text or null;
+   * `tell.choose(device)` opens the choice of its counters.
+   */
+  constructor(template, trace, tell) {
     this.element = template.content.firstElementChild.cloneNode(true);
     for (const node of this.element.querySelectorAll("[data-f]")) this.#fields[node.dataset.f] = node;
+    this.#trace = trace;
     this.#plot = new Plot(this.#fields.canvas, trace);
-    this.#act = act;
+    this.#lanes = new Lanes(this.#fields.lanes, trace);
+    this.#tell = tell;
+    this.#fields.tools.after(this.#panel.element);
+    this.#fields.choose.addEventListener("click", () => tell.choose(this.#device));
+    this.#fields.calibrate.addEventListener("click", () => this.#calibrate());
   }
 
   /** Fill the card from `device`; `now` is the server's clock; `stale` says that the server itself is not reached. */
   show(device, now, stale = false) {
     if (device.state !== this.#before) this.#error = null;
     this.#before = device.state;
+    this.#device = device;
+    this.#panel.show(device);
     this.#state(stale ? "stale" : device.state);
     this.#head(device, now);
     this.#numbers(device);
+    this.#counters(device);
     this.#facts(device, now);
   }
 
   draw(nowMs, options) {
     this.#plot.draw(nowMs, options);
+    this.#lanes.draw(this.#trace.edge(nowMs), nowMs, options);
   }
 
   restyle() {
     this.#plot.restyle();
+    this.#lanes.restyle();
+  }
+
+  /** Take the card off the page. */
+  close() {
+    this.#panel.toggle(false);
+    this.element.remove();
+  }
+
+  #calibrate() {
+    const { calibrate } = this.#fields;
+    const open = calibrate.getAttribute("aria-expanded") !== "true";
+    calibrate.setAttribute("aria-expanded", String(open));
+    this.#panel.toggle(open);
   }
 
   #state(state) {
@@ -74,6 +107,9 @@ export class Card {
     this.#fields.canvas.setAttribute("aria-label", `The last ten seconds of ${name}: filtered acceleration in g, `
       + "both thresholds, and a mark at each counted step.");
     this.#battery(device.battery_percent);
+    this.#fields.lanes.setAttribute("aria-label", `Counters on ${name}`);
+    this.#fields.choose.setAttribute("aria-label", `Counters of ${name}`);
+    this.#fields.calibrate.setAttribute("aria-label", `Calibrate ${name}`);
     this.#button(device, name);
   }
 
@@ -99,7 +135,7 @@ export class Card {
     this.#asked = verb;
     this.#error = null;
     this.#fields.button.setAttribute("aria-disabled", "true");
-    this.#error = await this.#act(device, verb);
+    this.#error = await this.#tell.act(device, verb);
     this.#asked = null;
   }
 
@@ -125,7 +161,8 @@ export class Card {
     this.#text("packets", whole(device.packets));
     this.#text("packets-more", `${whole(device.packets_bad)} bad, ${whole(device.packets_duplicate)} repeated`);
     this.#text("lost", percent(device.samples_lost, device.samples));
-    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`);
+    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`
+      + (device.samples_saturated ? `, ${whole(device.samples_saturated)} at their limit` : ""));
     this.#text("gaps", whole(device.gaps));
     this.#text("gaps-more", plural(device.reboots, "restart"));
     this.#text("rate", measured(device.measured_rate_hz ?? device.rate_hz, 1, "Hz"));
@@ -135,13 +172,18 @@ export class Card {
     const since = device.session_since;
     this.#text("session", since ? localTime(since, now) : UNKNOWN);
     this.#text("session-more", since ? `for ${duration((now - new Date(since)) / 1000)}` : "not begun");
-    this.#counters(device);
   }
 
-  #counters({ primary, counters }) {
-    const others = Object.entries(counters).filter(([name]) => name !== primary);
-    this.#text("primary", words(primary));
-    this.#text("others", others.map(([name, steps]) => `${words(name)} ${whole(steps)}`).join(" · "));
+  #counters(device) {
+    const { primary } = device;
+    this.#lanes.show(device);
+    this.element.style.setProperty("--lanes", this.#lanes.count);
+    this.#text("axis", look(primary).signal);
+    if (this.#fields["key-step"].dataset.counter === primary) return;
+    this.#fields["key-step"].dataset.counter = primary;
+    const likely = glyph(primary);
+    likely.classList.add("likely");
+    this.#fields["key-step"].replaceChildren(likely, "likely", glyph(primary), "counted step");
   }
 
   #text(field, text) {
@@ -166,8 +208,4 @@ function strength(dbm) {
   if (dbm == null) return "";
   if (dbm > -65) return "strong";
   return dbm > -80 ? "good" : "weak";
-}
-
-function words(name) {
-  return name.replaceAll("_", " ");
 }

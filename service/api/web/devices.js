@@ -63,10 +63,16 @@ const TAKERS = {
     const { device, trace } = entry;
     const counters = { ...device.counters, [message.counter]: message.steps };
     entry.device = { ...device, counters };
+    trace.addStep(message, nowMs, message.counter === device.primary);
     if (message.counter !== device.primary) return;
     const steps = device.steps + 1; // the device's count, which goes on where the counter's own begins anew
     entry.device = { ...device, counters, steps, steps_now: Math.max(device.steps_now, steps) };
-    trace.addStep(message, nowMs);
+  },
+  tentative(entry, message, nowMs) {
+    entry.trace.addTentative(message, nowMs, entry.device.primary);
+  },
+  segment(entry, { primary, steps }) {
+    entry.device = { ...entry.device, primary, steps, steps_now: steps };
   },
   counting(entry, { steps, steps_now, cadence_spm }) {
     entry.device = { ...entry.device, steps, steps_now, cadence_spm };

@@ -18,6 +18,11 @@ export function measured(value, digits, unit) {
   return value == null ? UNKNOWN : `${value.toFixed(digits).replace("-", "−")}\u00a0${unit}`;
 }
 
+/** Return `text` with a capital at its head. */
+export function capital(text) {
+  return text.slice(0, 1).toUpperCase() + text.slice(1);
+}
+
 /** Return "1 gap" or "3 gaps". */
 export function plural(count, noun) {
   return `${whole(count)} ${noun}${count === 1 ? "" : "s"}`;

@@ -5,27 +5,19 @@
  * marks are final and lie on the signal; a mark that is decided earlier pops up within the faint part.
  */
 
-export const WINDOW_S = 10;
+import { PAD, WINDOW_S, fit, theme, ticks, timeAxis } from "./axis.js";
+import { COLOURS, look, outline, paintCounted, paintLikely } from "./looks.js";
+import { presence } from "./trace.js";
+
 /** Display delay of what is decided: one threshold window and the next two valleys of a slow walk. */
 export const DECIDING_S = 2.5;
 /** A hole this long in the signal is a gap; a shorter one is a message that was merged away. */
 const HOLE_S = 0.12;
 /** A hole that reaches the right edge may still be filled by what is on its way. */
 const OPEN_HOLE_S = 1;
-const POP_MS = 450;
 /** Smallest height of the picture in g, so that rest looks like rest. */
 const LEAST_SPAN_G = 0.6;
-const PAD = { top: 24, right: 14, bottom: 26, left: 40 };
-const TICKS_G = [0.1, 0.2, 0.5, 1, 2, 5, 10];
 const RANGE_PER_S = 3;
-
-/** Return the ticks in [low, high], at most about five, at a round distance. */
-export function ticks(low, high) {
-  const step = TICKS_G.find((g) => (high - low) / g <= 5.5) ?? TICKS_G.at(-1);
-  const first = Math.ceil(low / step - 1e-9);
-  const count = Math.max(0, Math.floor(high / step + 1e-9) - first + 1);
-  return Array.from({ length: count }, (_, i) => Number(((first + i) * step).toFixed(6)));
-}
 
 /** Return [from, to] of each stretch of [fromS, toS] without samples: HOLE_S long, OPEN_HOLE_S where it goes on. */
 export function holes(trace, fromS, toS) {
@@ -60,16 +52,12 @@ export class Plot {
 
   /** Read the colours of the theme again. */
   restyle() {
-    const style = getComputedStyle(this.#canvas);
-    for (const name of ["signal", "upper", "lower", "step", "grid", "ink-soft", "card", "gap"]) {
-      this.#colours[name] = style.getPropertyValue(`--${name}`).trim();
-    }
-    this.#colours.font = `12px ${style.fontFamily}`;
+    this.#colours = theme(this.#canvas, ["signal", "upper", "lower", "grid", "ink-soft", "card", "gap", ...COLOURS]);
   }
 
   /** Draw the picture of `nowMs`; without `motion` marks appear without an animation. */
   draw(nowMs, { motion = true } = {}) {
-    const { width, height } = this.#fit();
+    const { width, height } = fit(this.#canvas, this.#context);
     if (!width || !height) return;
     const edge = this.#trace.edge(nowMs);
     const frame = this.#frame(edge, width, height, nowMs);
@@ -91,24 +79,11 @@ export class Plot {
     this.#context.restore();
   }
 
-  #fit() {
-    const { clientWidth: width, clientHeight: height } = this.#canvas;
-    const scale = window.devicePixelRatio || 1;
-    const [w, h] = [Math.round(width * scale), Math.round(height * scale)];
-    if (this.#canvas.width !== w || this.#canvas.height !== h) {
-      this.#canvas.width = w;
-      this.#canvas.height = h;
-    }
-    this.#context.setTransform(scale, 0, 0, scale, 0, 0);
-    return { width, height };
-  }
-
   /** Return the mapping of device time and g to the canvas; the range of g glides. */
   #frame(edge, width, height, nowMs) {
-    const [right, bottom] = [width - PAD.right, height - PAD.bottom];
-    const fromS = (edge ?? 0) - WINDOW_S;
+    const bottom = height - PAD.bottom;
+    const { fromS, right, x } = timeAxis(edge, width);
     const [low, high] = this.#glide(this.#extent(fromS, edge), nowMs);
-    const x = (s) => PAD.left + ((s - fromS) / WINDOW_S) * (right - PAD.left);
     const y = (g) => bottom - ((g - low) / (high - low)) * (bottom - PAD.top);
     return { edge, fromS, right, bottom, low, high, x, y };
   }
@@ -253,38 +228,42 @@ export class Plot {
     this.#line(left, PAD.top, left, bottom);
   }
 
+  /** Mark the primary's steps on the signal: hollow while they are likely, solid once they count. */
   #marks({ fromS, bottom, x, y }, nowMs, motion) {
-    for (const { atS, peak, bornMs } of this.#trace.steps) {
-      if (atS < fromS - 0.2) continue;
-      const age = motion ? Math.min(1, (nowMs - bornMs) / POP_MS) : 1;
-      this.#mark(x(atS), peak == null ? PAD.top + 6 : y(peak), age, bottom);
+    const onSignal = ({ atS, peak }) => {
+      const g = peak ?? this.#trace.valueAt(atS);
+      return g === null ? PAD.top + 6 : y(g);
+    };
+    const shown = ({ atS }) => atS >= fromS - 0.2;
+    for (const step of this.#trace.likely.filter(shown)) {
+      const mark = this.#shape(step.counter, x(step.atS), onSignal(step), 4.5);
+      paintLikely(this.#context, mark.shape, { ...mark.paint, alpha: presence(step, nowMs, motion) });
+    }
+    for (const step of this.#trace.steps.filter((step) => step.onSignal && shown(step))) {
+      this.#counted(step, x(step.atS), onSignal(step), bottom, presence(step, nowMs, motion));
     }
   }
 
-  #mark(x, y, age, bottom) {
+  #shape(counter, x, y, radius) {
+    const colour = this.#colours[look(counter).colour];
+    return { shape: outline(counter, x, y, radius), paint: { colour, ground: this.#colours.card } };
+  }
+
+  /** A step that was not likely before rings once; one that was becomes solid. */
+  #counted({ counter, wasLikely }, x, y, bottom, age) {
     const c = this.#context;
-    c.strokeStyle = this.#colours.step;
+    const { shape, paint } = this.#shape(counter, x, y, 5);
+    c.strokeStyle = paint.colour;
     c.lineWidth = 1;
     c.globalAlpha = 0.22;
     this.#line(x, y, x, bottom);
-    if (age < 1) {
+    if (age < 1 && !wasLikely) {
       c.globalAlpha = 1 - age;
       c.lineWidth = 2;
-      this.#disc(x, y, 5 + 14 * age);
-      c.stroke();
+      c.stroke(outline(counter, x, y, 5 + 14 * age));
     }
-    c.globalAlpha = 1;
-    c.fillStyle = this.#colours.step;
-    c.strokeStyle = this.#colours.card;
-    c.lineWidth = 2;
-    this.#disc(x, y, 5);
-    c.fill();
-    c.stroke();
-  }
-
-  #disc(x, y, radius) {
-    this.#context.beginPath();
-    this.#context.arc(x, y, radius, 0, 2 * Math.PI);
+    if (age < 1 && wasLikely) paintLikely(c, shape, paint);
+    paintCounted(c, shape, { ...paint, alpha: wasLikely ? age : 1 });
   }
 
   #line(x1, y1, x2, y2) {

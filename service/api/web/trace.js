@@ -15,11 +15,25 @@ const LEAK = 0.01;
 /** A jump of the device's time beyond this is shown at once and not glided to. */
 const JUMP_S = 1;
 const GLIDE_PER_S = 4;
+/** How long a mark takes to come up or to go. */
+const FADE_MS = 450;
+/** Half a sample: what is told of the same step twice lies closer. */
+const SAME_S = 0.01;
+
+/** Return how far a mark is there, in [0, 1]: it comes up when it is born and goes when it is taken back. */
+export function presence({ bornMs, goneMs = null }, nowMs, motion = true) {
+  if (!motion) return goneMs === null ? 1 : 0;
+  const here = Math.min(1, Math.max(0, (nowMs - bornMs) / FADE_MS));
+  return goneMs === null ? here : Math.max(0, here - (nowMs - goneMs) / FADE_MS);
+}
 
 export class Trace {
   rateHz = 50;
   bands = [];
+  /** Counted steps of every counter; those `onSignal` are the primary's. */
   steps = [];
+  /** Steps of the primary that are likely, and those taken back a moment ago. */
+  likely = [];
   gaps = [];
   #values = new Float32Array(CAPACITY).fill(NaN);
   #begin = null;
@@ -33,6 +47,7 @@ export class Trace {
   reset() {
     this.bands = [];
     this.steps = [];
+    this.likely = [];
     this.gaps = [];
     this.#values.fill(NaN);
     this.#begin = null;
@@ -53,10 +68,25 @@ export class Trace {
     this.#prune();
   }
 
-  /** Take a counted "step"; a repeated one changes nothing. */
-  addStep({ ordinal, device_s, peak }, nowMs) {
+  /** Take a counted "step"; a repeated one changes nothing. `onSignal` says that it is the primary's. */
+  addStep({ ordinal, counter, device_s, peak }, nowMs, onSignal = true) {
     if (this.steps.some((step) => step.ordinal === ordinal)) return;
-    this.steps.push({ ordinal, atS: device_s, peak: peak ?? this.valueAt(device_s), bornMs: nowMs });
+    const before = this.likely.length;
+    if (onSignal) this.likely = this.likely.filter(({ atS }) => Math.abs(atS - device_s) > SAME_S);
+    const wasLikely = this.likely.length < before;
+    const height = peak ?? this.valueAt(device_s);
+    this.steps.push({ ordinal, counter, atS: device_s, peak: height, bornMs: nowMs, onSignal, wasLikely });
+  }
+
+  /**
+   * Take a "tentative" message of the primary, `counter`: a likely step, or one that is taken back.
+   * Those that do not pass the thresholds in force are for navigation; at rest they would flicker.
+   */
+  addTentative({ status, device_s, passes = true }, nowMs, counter) {
+    const known = this.likely.find(({ atS, goneMs }) => goneMs === null && Math.abs(atS - device_s) <= SAME_S);
+    if (status === "retracted" && known) known.goneMs = nowMs;
+    if (status !== "likely" || known || !passes) return;
+    this.likely.push({ counter, atS: device_s, peak: null, bornMs: nowMs, goneMs: null });
   }
 
   /** Take a "gap": `filled` ones were interpolated and are drawn as signal. */
@@ -120,6 +150,7 @@ export class Trace {
     const oldestS = this.#end / this.rateHz - KEPT_S;
     this.bands = this.bands.filter(({ to_s }) => to_s > oldestS);
     this.steps = this.steps.filter(({ atS }) => atS > oldestS);
+    this.likely = this.likely.filter(({ atS }) => atS > oldestS);
     this.gaps = this.gaps.filter(({ toS }) => toS > oldestS);
   }
 }

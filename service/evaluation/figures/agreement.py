@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.evaluation.figures.canvas import COLOURS, label, picture
 from service.evaluation.metrics import accuracy_percent
 from service.evaluation.papers.chen2015 import CALCULATION_S
+from service.evaluation.papers.report import Bar
 from service.evaluation.papers.results import TIMED_SAMPLES
 from service.evaluation.rows import Row
+from service.signals.compiled import available
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Floats = NDArray[np.float64]
+
+FEW_GROUPS: Final = 4
+"""Fewer are drawn no wider."""
+BAR_FROM_PERCENT: Final = 1.0
+"""A shorter bar cannot be seen: its value is written instead."""
+STEPS_OFF: Final = "counted − true / steps"
+BAND_SPM: Final = 10.0
+"""Cadences are put together in bands as wide, for a median each."""
+LINEAR_PERCENT: Final = 10.0
+"""Errors up to this are drawn to scale, larger ones by their logarithm."""
 LIMITS_SD: Final = 1.96
 """Limits of agreement: 95 % of differences, were they normal (Bland and Altman 1986)."""
 
@@ -32,7 +47,7 @@ def walks(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def accuracy(path: Path, rows: Sequence[Row]) -> Path:
-    """Figure 12 of 2015: mean accuracy by data set and counter; below 0 where twice the steps are counted."""
+    """Mean accuracy by data set and counter; what is below 0, where twice the steps are counted, as a number."""
     by_counter = walks(rows)
     groups = list(dict.fromkeys(row.dataset for found in by_counter.values() for row in found))
 
@@ -41,12 +56,50 @@ def accuracy(path: Path, rows: Sequence[Row]) -> Path:
         for number, (counter, found) in enumerate(by_counter.items()):
             means = [_mean_accuracy([row for row in found if row.dataset == group]) for group in groups]
             at = np.arange(len(groups)) + (number - (len(by_counter) - 1) / 2) * width
-            axes[0].bar(at, np.clip(means, 0, None), width, color=COLOURS[number % len(COLOURS)], label=counter)
-        axes[0].set_xticks(range(len(groups)), [_short(group) for group in groups], rotation=20, ha="right")
-        axes[0].set_ylim(0, 105)
+            _bars(axes[0], at.tolist(), means, width, number, counter)
+        axes[0].set_xticks(range(len(groups)), [_wrapped(group) for group in groups], fontsize="small")
         label(axes[0], title="Mean accuracy over recordings", y="accuracy / %", legend=True)
 
     return picture(path, draw)
+
+
+def against_published(path: Path, bars: Sequence[Bar]) -> Path:
+    """Figure 12 of 2015: a paper's accuracies beside ours, on walkers above and on real recordings below."""
+    panels = [found for real in (False, True) if (found := [bar for bar in bars if bar.real is real])]
+    methods = list(dict.fromkeys(bar.method for bar in bars))
+
+    def draw(axes: list[Axes]) -> None:
+        for each, found in zip(axes, panels, strict=True):
+            _beside_published(each, found, methods)
+        label(axes[0], title="Accuracies and what the paper claims", legend=True)
+
+    return picture(path, draw, panels=len(panels), share_x=False)
+
+
+def _beside_published(axes: Axes, bars: Sequence[Bar], methods: Sequence[str]) -> None:
+    groups = list(dict.fromkeys(bar.group for bar in bars))
+    width = 0.8 / len(methods)
+    for number, method in enumerate(methods):
+        of = [bar for bar in bars if bar.method == method]
+        at = [groups.index(bar.group) + (number - (len(methods) - 1) / 2) * width for bar in of]
+        _bars(axes, at, [bar.ours for bar in of], width, number, f"{method}, ours")
+        claimed = "published" if number == len(methods) - 1 else None
+        axes.bar(at, [bar.published for bar in of], width, fill=False, edgecolor="black", lw=1.2, label=claimed)
+    axes.set_xticks(range(len(groups)), [_wrapped(group, 84 // len(groups)) for group in groups], fontsize="x-small")
+    aside = 0.5 + max(0.0, (FEW_GROUPS - len(groups)) / 2)
+    axes.set_xlim(-aside, len(groups) - 1 + aside)
+    label(axes, y=f"{'recordings' if bars[0].real else 'walkers'}: accuracy / %")
+
+
+def _bars(axes: Axes, at: Sequence[float], percents: Sequence[float], width: float, number: int, name: str) -> None:
+    """Draw bars from 0 to 100; one that ends below 0 has its value written where it would stand."""
+    colour = COLOURS[number % len(COLOURS)]
+    axes.bar(at, np.clip(percents, 0, None), width, color=colour, label=name)
+    for place, percent in zip(at, percents, strict=True):
+        if percent < BAR_FROM_PERCENT:
+            text = f"{percent:.0f} %".replace("-", "−")
+            axes.text(place, 1, text, color=colour, ha="center", va="bottom", rotation=90, fontsize="small")
+    axes.set_ylim(0, 105)
 
 
 def timing(path: Path, rows: Sequence[Row]) -> Path:
@@ -58,9 +111,11 @@ def timing(path: Path, rows: Sequence[Row]) -> Path:
     names = list(elapsed)
     ours_s = [TIMED_SAMPLES * sum(e for e, _ in elapsed[name]) / sum(n for _, n in elapsed[name]) for name in names]
 
+    how = "compiled by numba" if available() else "plain Python, numba is missing"
+
     def draw(axes: list[Axes]) -> None:
         at = np.arange(len(names))
-        axes[0].bar(at - 0.2, ours_s, 0.4, color=COLOURS[0], label="here, counting only")
+        axes[0].bar(at - 0.2, ours_s, 0.4, color=COLOURS[0], label=f"here, counting only, {how}")
         published = [(number, CALCULATION_S[name]) for number, name in enumerate(names) if name in CALCULATION_S]
         if published:
             places, seconds = zip(*published, strict=True)
@@ -85,31 +140,45 @@ def bland_altman(path: Path, rows: Sequence[Row]) -> Path:
             each.axhline(bias, color=colour, lw=1.2)
             for limit in (bias - LIMITS_SD * sd, bias + LIMITS_SD * sd):
                 each.axhline(limit, color=colour, lw=1, ls="--")
-            label(each, y="counted − true")
+            label(each, y=STEPS_OFF)
             text = (
                 f"{counter}: bias {bias:+.1f} steps, limits {bias - LIMITS_SD * sd:+.1f} … {bias + LIMITS_SD * sd:+.1f}"
             )
             each.set_title(text, fontsize="small", loc="left")
         label(axes[-1], title="Agreement of counted and true steps", x="mean of counted and true / steps")
 
-    return picture(path, draw, panels=max(len(by_counter), 1))
+    return picture(path, draw, panels=max(len(by_counter), 1), share_y=True)
 
 
 def error_by_cadence(path: Path, rows: Sequence[Row]) -> Path:
-    """Error in percent against cadence, true steps over the whole time of a recording."""
+    """Error in percent against cadence, true steps over the whole time of a recording; a panel for each counter."""
     by_counter = walks(rows)
 
     def draw(axes: list[Axes]) -> None:
-        for number, (counter, found) in enumerate(by_counter.items()):
-            cadence = [60 * (row.true_steps or 0) / (row.duration_s or 1.0) for row in found]
-            error = [100 * (counted - true) / true for true, counted in _pairs(found)]
-            colour = COLOURS[number % len(COLOURS)]
-            axes[0].plot(cadence, error, ".", color=colour, alpha=0.6, label=counter)
-        axes[0].axhline(0, color="black", lw=0.8)
-        axes[0].set_yscale("symlog", linthresh=10)
-        label(axes[0], title="Error by cadence", x="cadence / steps/min", y="(counted − true)/true / %", legend=True)
+        for each, (number, (counter, found)) in zip(axes, enumerate(by_counter.items()), strict=False):
+            cadence_spm = np.array([60 * (row.true_steps or 0) / (row.duration_s or 1.0) for row in found])
+            percent = np.array([100 * (counted - true) / true for true, counted in _pairs(found)])
+            each.plot(cadence_spm, percent, ".", color=COLOURS[number % len(COLOURS)], alpha=0.4)
+            each.plot(
+                *medians(cadence_spm, percent), "_", color="black", ms=12, mew=2, label="median of each 10 steps/min"
+            )
+            each.axhline(0, color="black", lw=0.8)
+            each.set_yscale("symlog", linthresh=LINEAR_PERCENT, subs=[3])
+            each.yaxis.set_major_formatter("{x:g}")
+            each.yaxis.set_minor_formatter("{x:g}")
+            each.tick_params(axis="y", which="both", labelsize="small")
+            each.set_title(counter, fontsize="small", loc="right")
+            label(each, y="error / %", legend=not number)
+        label(axes[-1], title="Error by cadence: (counted − true)/true", x="cadence / steps/min")
 
-    return picture(path, draw)
+    return picture(path, draw, panels=max(len(by_counter), 1), share_y=True)
+
+
+def medians(cadence_spm: Floats, percent: Floats) -> tuple[list[float], list[float]]:
+    """Return the middles of the bands of cadence that hold recordings, and the median error in each."""
+    band = np.floor(cadence_spm / BAND_SPM)
+    held = np.unique(band)
+    return [(b + 0.5) * BAND_SPM for b in held.tolist()], [float(np.median(percent[band == b])) for b in held]
 
 
 def _pairs(rows: Sequence[Row]) -> list[tuple[int, int]]:
@@ -120,5 +189,6 @@ def _mean_accuracy(rows: Sequence[Row]) -> float:
     return float(np.mean([accuracy_percent(counted, true) for true, counted in _pairs(rows)])) if rows else np.nan
 
 
-def _short(name: str, most: int = 24) -> str:
-    return name if len(name) <= most else f"{name[: most - 1]}…"
+def _wrapped(name: str, width: int = 12) -> str:
+    """Break a name into lines, at underscores too."""
+    return "\n".join(textwrap.wrap(name.replace("_", "_ "), max(width, 14))).replace("_ ", "_")

@@ -14,6 +14,7 @@ from service.counters import registry
 from service.counters.double_threshold import PAPER
 from service.evaluation.figures.canvas import COLOURS, label, picture
 from service.evaluation.figures.sources import Floats, Source, middle, times_s
+from service.evaluation.rows import Choice, Row
 from service.samples import GRID_HZ, Band, Step
 
 if TYPE_CHECKING:
@@ -21,6 +22,19 @@ if TYPE_CHECKING:
 
 REST_G: Final = PAPER.rest_raw / PAPER.lsb_per_g
 TIME: Final = "time / s"
+
+
+NAME: Final = "double_threshold"
+PUBLISHED: Final = Choice(counter=NAME, preset="paper", overrides={})
+
+
+def evaluated(rows: Sequence[Row]) -> Choice:
+    """Return how the double threshold was evaluated, so that it is drawn the same; as published where it was not."""
+    for row in rows:
+        if row.counter == NAME:
+            overrides = {key: row.params[key] for key in row.changed}
+            return Choice(counter=NAME, preset=row.preset, overrides=overrides)
+    return PUBLISHED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,16 +45,34 @@ class Counted:
     filtered_g: Floats
     bands: Sequence[Band]
     steps: Sequence[Step]
+    magnitude_g: Floats
+    axes: str
+    told: str
 
 
-def counted(source: Source) -> Counted:
-    """Count the source with the published parameters."""
-    counter = registry.make("double_threshold", "paper")
+def counted(source: Source, chosen: Choice = PUBLISHED) -> Counted:
+    """Count the source with the double threshold as it is `chosen`."""
+    counter = registry.make(NAME, chosen.preset, chosen.overrides)
     update, rest = counter.update(source.signal), counter.finish()
     start_s = source.signal.start / GRID_HZ
     filtered_g = np.asarray(update.trace)
     t_s = update.trace_from_s - start_s + np.arange(len(filtered_g)) / GRID_HZ
-    return Counted(t_s=t_s, filtered_g=filtered_g, bands=update.bands + rest.bands, steps=update.steps + rest.steps)
+    params = registry.parameters(NAME, chosen.preset, chosen.overrides)
+    two = params.axes == "xz"
+    return Counted(
+        t_s=t_s,
+        filtered_g=filtered_g,
+        bands=update.bands + rest.bands,
+        steps=update.steps + rest.steps,
+        magnitude_g=_two_axes_g(source) if two else source.norm_g,
+        axes="√(X² + Z²)" if two else "norm",
+        told=" ".join([f"{NAME}, preset {chosen.preset}", *(f"{k}={v}" for k, v in chosen.overrides.items())]),
+    )
+
+
+def _two_axes_g(source: Source) -> Floats:
+    two_g: Floats = np.sqrt((source.acc_g[:, [0, 2]] ** 2).sum(axis=1))
+    return two_g
 
 
 def raw_axes(path: Path, source: Source) -> Path:
@@ -60,7 +92,7 @@ def raw_axes(path: Path, source: Source) -> Path:
 def magnitude(path: Path, source: Source) -> Path:
     """Figure 3: magnitude on two axes, the norm beside it."""
     part = middle(source)
-    two_g = np.sqrt((source.acc_g[part][:, [0, 2]] ** 2).sum(axis=1))
+    two_g = _two_axes_g(source)[part]
 
     def draw(axes: list[Axes]) -> None:
         axes[0].plot(times_s(part), two_g, color=COLOURS[0], lw=1, label="√(X² + Z²), two axes (4)")
@@ -70,37 +102,37 @@ def magnitude(path: Path, source: Source) -> Path:
     return picture(path, draw)
 
 
-def filtered(path: Path, source: Source) -> Path:
-    """Figure 4: magnitude on two axes before and after the five-point mean, at the times of its samples."""
-    part, seen = middle(source), counted(source)
-    two_g = np.sqrt((source.acc_g[part][:, [0, 2]] ** 2).sum(axis=1))
+def filtered(path: Path, source: Source, chosen: Choice = PUBLISHED) -> Path:
+    """Figure 4: the magnitude before and after the five-point mean, at the times of its samples."""
+    part, seen = middle(source), counted(source, chosen)
     shown = _shown(seen.t_s, part)
 
     def draw(axes: list[Axes]) -> None:
-        axes[0].plot(times_s(part), two_g, color=COLOURS[0], lw=0.7, alpha=0.6, label="√(X² + Z²)")
+        axes[0].plot(times_s(part), seen.magnitude_g[part], color=COLOURS[0], lw=0.7, alpha=0.6, label=seen.axes)
         axes[0].plot(seen.t_s[shown], seen.filtered_g[shown], color=COLOURS[1], lw=1.4, label="five-point mean (5)")
         label(axes[0], title=f"Filtered magnitude: {source.name}", x=TIME, y="acceleration / g", legend=True)
 
     return picture(path, draw)
 
 
-def thresholds(path: Path, source: Source) -> Path:
+def thresholds(path: Path, source: Source, chosen: Choice = PUBLISHED) -> Path:
     """Both thresholds, window by window, and the steps (9)(10)."""
-    part, seen = middle(source), counted(source)
+    part, seen = middle(source), counted(source, chosen)
     shown = _shown(seen.t_s, part)
 
     def draw(axes: list[Axes]) -> None:
         axes[0].plot(seen.t_s[shown], seen.filtered_g[shown], color=COLOURS[0], lw=1.2, label="five-point mean")
         _bands(axes[0], source, part, seen.bands)
         _steps(axes[0], source, part, seen.steps)
-        label(axes[0], title=f"Thresholds and steps: {source.name}", x=TIME, y="acceleration / g", legend=True)
+        title = f"Thresholds and steps: {source.name}\n{seen.told}"
+        label(axes[0], title=title, x=TIME, y=f"{seen.axes} / g", legend=True)
 
     return picture(path, draw)
 
 
-def false_peaks(path: Path, source: Source) -> Path:
+def false_peaks(path: Path, source: Source, chosen: Choice = PUBLISHED) -> Path:
     """Figure 6: peaks that are not counted, for their height, valley or spacing, beside those that are."""
-    part, seen = middle(source), counted(source)
+    part, seen = middle(source), counted(source, chosen)
     shown = _shown(seen.t_s, part)
     t_s, values = seen.t_s[shown], seen.filtered_g[shown]
     top = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])) + 1
@@ -111,7 +143,8 @@ def false_peaks(path: Path, source: Source) -> Path:
         axes[0].plot(t_s, values, color=COLOURS[0], lw=1.2)
         axes[0].plot(t_s[top[is_step]], values[top[is_step]], "o", color=COLOURS[2], label="peak, counted")
         axes[0].plot(t_s[top[~is_step]], values[top[~is_step]], "x", color=COLOURS[1], label="peak, not counted")
-        label(axes[0], title=f"False peaks: {source.name}", x=TIME, y="five-point mean / g", legend=True)
+        title = f"False peaks: {source.name}\n{seen.told}"
+        label(axes[0], title=title, x=TIME, y=f"five-point mean of {seen.axes} / g", legend=True)
 
     return picture(path, draw)
 

@@ -34,7 +34,7 @@ def checked_folder(folder: str) -> Path:
     return path
 
 
-def picture(path: Path, draw: Draw, *, panels: int = 1, share_time: bool = True) -> Path:
+def picture(path: Path, draw: Draw, *, panels: int = 1, share_x: bool = True, share_y: bool = False) -> Path:
     """Draw `panels` axes one below the other with `draw` and write them to `path`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  # heavy, and an extra
     from matplotlib.figure import Figure  # noqa: PLC0415
@@ -42,7 +42,7 @@ def picture(path: Path, draw: Draw, *, panels: int = 1, share_time: bool = True)
     height = HEIGHT_INCH if panels == 1 else 1.9 * panels + 0.8
     figure = Figure(figsize=(WIDTH_INCH, height), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(panels, 1, sharex=share_time, squeeze=False)[:, 0]
+    axes = figure.subplots(panels, 1, sharex=share_x, sharey=share_y, squeeze=False)[:, 0]
     draw(list(axes))
     for each in axes:
         each.grid(visible=True, alpha=0.3)
@@ -51,11 +51,11 @@ def picture(path: Path, draw: Draw, *, panels: int = 1, share_time: bool = True)
     return path
 
 
-def label(axes: Axes, *, title: str = "", x: str = "", y: str = "", legend: bool = False) -> None:
+def label(axes: Axes, *, title: str = "", x: str = "", y: str = "", legend: bool = False, columns: int = 5) -> None:
     """Name what the axes show, units included."""
     axes.set(**{name: text for name, text in (("xlabel", x), ("ylabel", y)) if text})
     figure = axes.get_figure(root=True)
     if title and figure is not None:
         figure.suptitle(title)
     if legend:  # above the axes, where it hides nothing
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, fontsize="small", frameon=False)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize="small", frameon=False)

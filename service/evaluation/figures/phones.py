@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from service.counters.gyro_zero_crossing import PAPER as GYRO
 from service.evaluation.figures.canvas import COLOURS, label, picture
-from service.evaluation.figures.sources import Floats, Source, Sources, middle, times_s
+from service.evaluation.figures.events import Event, Kind, busiest, events
+from service.evaluation.figures.sources import Pool, Source, Sources, middle, times_s
 from service.samples import GRID_HZ
 
 if TYPE_CHECKING:
@@ -19,40 +21,42 @@ WALK_G: Final = 1.2
 RUN_G: Final = 2.0
 """Between them lie 99 % of a walk's step maxima, above the second 99 % of a run's (2015, section 1.3.2)."""
 CYCLE_S: Final = 6.0
-REJECT: Final = 0.5
-UPDATE: Final = 0.3
-"""Of Δt₁ (5) and of Δt₂ (7) in the document on Khedr 2017."""
+BIN_G: Final = 0.1
+LARGEST_G: Final = 6.0
+"""The last bin holds what is larger too."""
 
-
-def step_maxima_g(source: Source) -> Floats:
-    """Return the largest norm of each of as many equal parts as there are true steps, in g."""
-    parts = np.array_split(source.norm_g, max(source.true_steps, 1))
-    return np.array([part.max() for part in parts if len(part)])
+_MARKS: Final = {
+    Kind.TAKEN: ("o", COLOURS[4], "taken"),
+    Kind.REPLACED: ("D", COLOURS[6], "taken, then replaced by a more extreme one (7)(8)"),
+    Kind.REJECTED: ("x", COLOURS[1], "rejected, too soon (5)(6)"),
+    Kind.PASSED_OVER: ("+", COLOURS[5], "passed over: the last is final, or more extreme"),
+}
 
 
 def maxima(path: Path, of: Sources) -> Path:
     """Figure 8 of 2015: how large a step's maximum is, walking and running."""
 
     def draw(axes: list[Axes]) -> None:
-        for source, name, colour in ((of.walk, "walk", COLOURS[0]), (of.run, "run", COLOURS[1])):
-            largest = step_maxima_g(source)
-            inside = largest > RUN_G if name == "run" else (largest >= WALK_G) & (largest <= RUN_G)
-            where = "above 2 g" if name == "run" else "in 1.2…2 g"
-            text = f"{name}: {100 * inside.mean():.0f} % {where} ({source.name})"
-            bins = np.arange(0.8, max(5.0, largest.max() + 0.2), 0.1).tolist()
-            axes[0].hist(
-                largest,
-                bins=bins,
-                weights=np.full(len(largest), 100 / len(largest)),
-                color=colour,
-                alpha=0.6,
-                label=text,
+        bins = np.arange(0.8, LARGEST_G + BIN_G / 2, BIN_G).tolist()
+        for pool, name, colour in ((of.walks, "walking", COLOURS[0]), (of.runs, "running", COLOURS[1])):
+            shown, weights = (
+                np.clip(pool.maxima_g, bins[0], bins[-1]),
+                np.full(len(pool.maxima_g), 100 / len(pool.maxima_g)),
             )
+            axes[0].hist(shown, bins=bins, weights=weights, color=colour, alpha=0.6, label=_told(pool, name))
         for level_g in (WALK_G, RUN_G):
             axes[0].axvline(level_g, color="black", ls="--", lw=1)
         label(axes[0], title="Step maxima", x="largest norm of a step / g", y="steps / %", legend=True)
 
     return picture(path, draw)
+
+
+def _told(pool: Pool, name: str) -> str:
+    largest_g = pool.maxima_g
+    inside = largest_g > RUN_G if name == "running" else (largest_g >= WALK_G) & (largest_g <= RUN_G)
+    where = "above 2 g" if name == "running" else "in 1.2…2 g"
+    whose = "synthetic walkers" if pool.synthetic else "recordings"
+    return f"{name}: {100 * inside.mean():.0f} % {where} ({len(largest_g)} steps of {pool.pieces} {whose})"
 
 
 def gait_cycle(path: Path, source: Source) -> Path:
@@ -84,29 +88,40 @@ def gait_cycle(path: Path, source: Source) -> Path:
     return picture(path, draw, panels=2)
 
 
-def regions(path: Path, source: Source) -> Path:
-    """Figure 9 of 2017: where a new extremum is rejected, and where it replaces the last one."""
-    from scipy import signal  # noqa: PLC0415  # heavy
+def regions(path: Path, sources: Sequence[Source]) -> Path:
+    """Figure 9 of 2017: where the fusion counter rejects a new extremum, and where one replaces the last.
 
-    part = middle(source, CYCLE_S / 2)
-    norm_g = signal.sosfiltfilt(signal.butter(2, 3.0, fs=GRID_HZ, output="sos"), source.norm_g)[part]
-    spread = 0.5 * float(norm_g.std())
-    peaks, valleys = (signal.find_peaks(sign * norm_g, prominence=spread)[0] for sign in (1, -1))
-    extrema = np.sort(np.concatenate([peaks, valleys]))
-    t_s = times_s(part)
+    Of all sources, the stretch in which that happens most.
+    """
+    seen = [(source, events(source)) for source in sources]
+    stretches = [busiest(watched, round(CYCLE_S * GRID_HZ)) for _, watched in seen]
+    (source, watched), (part, _) = max(zip(seen, stretches, strict=True), key=lambda each: each[1][1])
+    inside = [event for event in watched.events if part.start <= event.at < part.stop]
 
     def draw(axes: list[Axes]) -> None:
-        axes[0].plot(t_s, norm_g, color=COLOURS[0], lw=1.5, label="norm, low-pass 3 Hz")
-        for number, (before, last, now) in enumerate(zip(extrema, extrema[1:], extrema[2:], strict=False)):
-            waited_s, took_s = (t_s[last] - t_s[before], t_s[now] - t_s[last])
-            for begin_s, share_s, low, colour, text in (
-                (t_s[last], REJECT * waited_s, 0.0, COLOURS[1], "rejected: 0.5 Δt₁ (5)"),
-                (t_s[now], UPDATE * took_s, 0.5, COLOURS[6], "may be replaced: 0.3 Δt₂ (7)"),
-            ):
-                shown = text if not number else None
-                axes[0].axvspan(begin_s, begin_s + share_s, low, low + 0.5, color=colour, alpha=0.25, lw=0, label=shown)
-        axes[0].plot(t_s[extrema], norm_g[extrema], "o", color=COLOURS[4], label="peak or valley")
-        title = f"Update and reject regions: {source.name}"
-        label(axes[0], title=title, x="time / s", y="acceleration / g", legend=True)
+        axes[0].plot(times_s(part), watched.norm_g[part], color=COLOURS[0], lw=1.5, label="filtered norm")
+        _regions(axes[0], inside, part)
+        for kind, (marker, colour, text) in _MARKS.items():
+            of = [event for event in inside if event.kind is kind]
+            at_s, norm_g = [event.at / GRID_HZ for event in of], [event.norm_g for event in of]
+            axes[0].plot(at_s, norm_g, marker, color=colour, ms=6, mew=1.8, label=f"{text} ({len(of)})", ls="none")
+        title = f"Update and reject regions, fusion, preset paper: {source.name}"
+        label(axes[0], title=title, x="time / s", y="acceleration / g", legend=True, columns=2)
 
     return picture(path, draw)
+
+
+def _regions(axes: Axes, inside: Sequence[Event], part: slice) -> None:
+    """Shade, after each event that stood, where another is rejected (below) and where it may be replaced (above)."""
+    last_s = (part.stop - 1) / GRID_HZ
+    drawn: set[str] = set()
+    for event in inside:
+        for span, low, colour, text in (
+            (event.reject, 0.0, COLOURS[1], "a new one is rejected: th_s = 0.5 Δt₁ (5)"),
+            (event.update, 0.5, COLOURS[6], "may be replaced: th_e = 0.3 Δt₂ (7)"),
+        ):
+            if span is not None:
+                first_s, to_s = (min(at / GRID_HZ, last_s) for at in span)
+                shown = None if text in drawn else text
+                drawn.add(text)
+                axes.axvspan(first_s, to_s, low, low + 0.5, color=colour, alpha=0.2, lw=0, label=shown)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -25,6 +25,9 @@ SHOWN_S: Final = 10.0
 RUN: Final = r"run|jog"
 WALK: Final = r"walk(?!_slow|_run|.*(stairs|steps)).*"
 REST: Final = r"rest|not_moving"
+PEOPLE: Final = 10
+SENSED: Final = 6
+"""Walks that the fusion counter is watched on, half a second each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,32 +49,85 @@ class Source:
         norm: Floats = np.sqrt((self.acc_g**2).sum(axis=1))
         return norm
 
+    @property
+    def has_all(self) -> bool:
+        """Tell whether all three sensors measured it."""
+        return self.signal.gyro_rad_s is not None and self.signal.mag_ut is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pool:
+    """The largest norm of every step of several walks or runs, in g; `pieces` is how many those are."""
+
+    maxima_g: Floats
+    pieces: int
+    synthetic: bool
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """A walk, a run and a rest to draw; a walk with the phone in the trouser pocket, which nobody recorded."""
+    """A walk, a run and a rest to draw, and what takes more than one recording.
+
+    `pocket` is a walk with the phone in the trouser pocket, which nobody recorded; `sensed` are walks with all three
+    sensors, up to SENSED; `walks` and `runs` pool every recorded walk and run.
+    """
 
     walk: Source
     run: Source
     rest: Source
     pocket: Source
+    sensed: tuple[Source, ...]
+    walks: Pool
+    runs: Pool
 
 
 def sources(found: Sequence[Found], lsb_per_g: float) -> Sources:
-    """Take the first recording of each kind, else a walker."""
+    """Take the first recording of each kind, else a walker; pool the step maxima of all walks, and of all runs."""
     recorded = {"walk": WALK, "run": RUN, "rest": REST}
     seen: dict[str, Source] = {}
+    sensed: list[Source] = []
+    maxima_g: dict[str, list[Floats]] = {"walk": [], "run": []}
     for file in found:
-        if len(seen) == len(recorded):
-            break
         for kind, source in _kinds(file, lsb_per_g, recorded):
             seen.setdefault(kind, source)
-    return Sources(**(_synthetic() | seen))
+            if kind == "walk" and source.has_all and len(sensed) < SENSED:
+                sensed.append(source)
+            if kind in maxima_g:
+                maxima_g[kind].append(step_maxima_g(source))
+    made = _synthetic() | seen
+    return Sources(
+        walk=made["walk"],
+        run=made["run"],
+        rest=made["rest"],
+        pocket=made["pocket"],
+        sensed=tuple(sensed) or (made["sensed"],),
+        walks=_pool("walk", maxima_g["walk"]),
+        runs=_pool("run", maxima_g["run"]),
+    )
+
+
+def step_maxima_g(source: Source) -> Floats:
+    """Return the largest norm of each of as many equal parts as there are true steps, in g."""
+    parts = np.array_split(source.norm_g, max(source.true_steps, 1))
+    return np.array([part.max() for part in parts if len(part)])
+
+
+def _pool(kind: str, parts: Sequence[Floats]) -> Pool:
+    """Pool what was recorded, else ten people's hundred steps: the 1,000 of 2015."""
+    made = parts or list(_people(kind))
+    return Pool(maxima_g=np.concatenate(made), pieces=len(made), synthetic=not parts)
+
+
+def _people(kind: str) -> Iterable[Floats]:
+    condition = _CONDITIONS[kind]
+    for k in range(PEOPLE):
+        signal = _walked(condition, k)
+        yield step_maxima_g(Source(name=condition.label, signal=signal, true_steps=condition.steps))
 
 
 def _kinds(file: Found, lsb_per_g: float, recorded: dict[str, str]) -> list[tuple[str, Source]]:
     try:
-        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping)
+        recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping, rate_hz=file.rate_hz)
         kinds = [kind for kind, pattern in recorded.items() if _is(recording, kind, pattern)]
         return [(kind, _source(f"{file.dataset}/{file.path.name}", recording)) for kind in kinds]
     except SteplinkError:
@@ -87,21 +143,22 @@ def _source(name: str, recording: Recording) -> Source:
     return Source(name=name, signal=grid_block(recording), true_steps=recording.true_steps or 0)
 
 
+_CONDITIONS: Final = {
+    "walk": Condition(label="synthetic walk", parts=(walk("normal", 100),)),
+    "run": Condition(label="synthetic run", parts=(walk("run", 100),)),
+    "rest": Condition(label="synthetic rest", parts=(do("rest", 30),)),
+    "pocket": Condition(label="synthetic walk, phone in the trouser pocket", parts=(walk("slow", 40),), pose="pocket"),
+    "sensed": Condition(label="synthetic walk, phone in the hand", parts=(walk("slow", 60),), pose="flat"),
+}
+
+
 def _synthetic() -> dict[str, Source]:
-    made = {
-        "walk": Condition(label="synthetic walk", parts=(walk("normal", 100),)),
-        "run": Condition(label="synthetic run", parts=(walk("run", 100),)),
-        "rest": Condition(label="synthetic rest", parts=(do("rest", 30),)),
-        "pocket": Condition(
-            label="synthetic walk, phone in the trouser pocket", parts=(walk("slow", 40),), pose="pocket"
-        ),
-    }
-    return {kind: Source(name=of.label, signal=_walked(of), true_steps=of.steps) for kind, of in made.items()}
+    return {kind: Source(name=of.label, signal=_walked(of), true_steps=of.steps) for kind, of in _CONDITIONS.items()}
 
 
-def _walked(condition: Condition) -> SampleBlock:
-    """Return person 0's walk without the standing before and after it."""
-    whole = block(condition, 0)
+def _walked(condition: Condition, k: int = 0) -> SampleBlock:
+    """Return person k's walk without the standing before and after it."""
+    whole = block(condition, k)
     stand = round(STAND_S * GRID_HZ)
     return cut(whole, stand, len(whole) - stand)
 

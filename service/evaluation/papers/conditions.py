@@ -56,12 +56,16 @@ class Figures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
-    """A counter as a table names it: `params` over its preset; on the other wrist where `mirrored`."""
+    """A counter as a table names it: `params` over its preset; on the other wrist where `mirrored`.
+
+    `by_axis`: it leaves an axis out, so a recording that holds nothing but the magnitude says nothing about it.
+    """
 
     label: str
     counter: str
     params: Mapping[str, Any] = field(default_factory=dict)
     mirrored: bool = False
+    by_axis: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +104,7 @@ class Claim:
     """What the text says: an accuracy of `percent` by `method`, in the rows that hold `rows` of the tables `tables`.
 
     It is of their mean, of the least mean of a row, or of the least walker (`of`: "mean", "least mean", "least").
+    `about` is what it concerns in a word or two, for a figure, and where there are several methods the same for all.
     """
 
     text: str
@@ -107,6 +112,7 @@ class Claim:
     percent: float
     of: str
     tables: tuple[int, ...]
+    about: str
     rows: str = ""
 
 

@@ -2,9 +2,10 @@
 
 Ten people by six poses by four gaits by 100 steps; accuracies in the text, no table. Neither poses nor gaits are listed
 in our copy: it names typing, calling, swinging in the hand and pocket, and slow, fast and running; ours are these, two
-bags and a normal walk. What the text calls low dynamic we take for typing, calling and both bags, high dynamic for
-swinging and pocket. The document's author adds five runs of his own. Not steps: shaking and rotating the phone on the
-spot, a magnetic disturbance; to stand: start and stop, run to walk, sudden stop.
+bags and a normal walk. The worst case is read as the mean of its ten people. What the text calls low dynamic we take
+for typing, calling and both bags, high dynamic for swinging and pocket. The document's author adds five runs of his
+own. Not steps: shaking and rotating the phone on the spot, a magnetic disturbance; to stand: start and stop, run to
+walk, sudden stop.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def _grid() -> Iterable[Condition]:
     for label, pose, dynamic in _POSES:
         for gait, activity in _GAITS:
             parts = (walk(activity, STEPS),)
-            worst = {_FUSION.label: Figures(true=STEPS, low=99.1)} if (label, gait) == ("typing", "slow") else {}
+            worst = {_FUSION.label: Figures(true=STEPS, accuracy=99.1)} if (label, gait) == ("typing", "slow") else {}
             name = f"{label}, {gait} ({dynamic})"
             yield Condition(label=name, parts=parts, pose=pose, walkers=WALKERS, published=worst)
 
@@ -63,13 +64,18 @@ _NOT_STEPS: Final = (
 
 
 def _claims() -> Iterable[Claim]:
-    for text, percent, of, rows in (
-        ("mean over all: 99.6 %", 99.6, "mean", ""),
-        ("worst, slow and typing: 99.1 %", 99.1, "mean", "typing, slow"),
-        ("low dynamic: 99.6 %", 99.6, "mean", "low dynamic"),
-        ("high dynamic: 99.47 % (beside it Fitbit Flex 2 98.31, Mi Band 2 98.02)", 99.47, "mean", "high dynamic"),
+    for text, percent, about, rows in (
+        ("mean over all: 99.6 %", 99.6, "all", ""),
+        ("worst case, slow and typing: 99.1 %", 99.1, "slow, typing", "typing, slow"),
+        ("low dynamic: 99.6 %", 99.6, "low dynamic", "low dynamic"),
+        (
+            "high dynamic: 99.47 % (beside it Fitbit Flex 2 98.31, Mi Band 2 98.02)",
+            99.47,
+            "high dynamic",
+            "high dynamic",
+        ),
     ):
-        yield Claim(text=text, method=_FUSION.label, percent=percent, of=of, tables=(1,), rows=rows)
+        yield Claim(text=text, method=_FUSION.label, percent=percent, of="mean", tables=(1,), about=about, rows=rows)
 
 
 PAPER: Final = Paper(

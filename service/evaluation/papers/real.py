@@ -47,6 +47,18 @@ class Measured:
         return sum(counted for _, counted in self.steps) / self.hours
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """A recording of one of the paper's conditions; `magnitude_only`: all but its first axis is 0 throughout."""
+
+    file: Found
+    magnitude_only: bool
+
+    def takes(self, method: Method) -> bool:
+        """Tell whether the method finds in it what it is about."""
+        return not (method.by_axis and self.magnitude_only)
+
+
 def methods(paper: Paper) -> list[Method]:
     """Return the methods of the paper's tables, each once, without the other wrist."""
     found: list[Method] = []
@@ -60,18 +72,21 @@ def choice(method: Method, preset: str) -> Choice:
     return Choice(counter=method.counter, preset=preset, overrides=method.params)
 
 
-def wanted(paper: Paper, found: Sequence[Found], lsb_per_g: float) -> list[Found]:
+def wanted(paper: Paper, found: Sequence[Found], lsb_per_g: float) -> list[Wanted]:
     """Return the files that have one of the paper's conditions and a known number of steps."""
-    return [file for file in found if _is_wanted(paper, file, lsb_per_g)]
+    looked = (_wanted(paper, file, lsb_per_g) for file in found)
+    return [file for file in looked if file is not None]
 
 
-def _is_wanted(paper: Paper, file: Found, lsb_per_g: float) -> bool:
+def _wanted(paper: Paper, file: Found, lsb_per_g: float) -> Wanted | None:
     try:
         recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping)
     except SteplinkError:
-        return False
+        return None
     known = recording.true_steps is not None or recording.step_t_s is not None
-    return known and any(fits(real, recording.placement, recording.activity) for real in paper.real)
+    if not known or not any(fits(real, recording.placement, recording.activity) for real in paper.real):
+        return None
+    return Wanted(file=file, magnitude_only=not recording.acc_g[:, 1:].any())
 
 
 def fits(real: Real, placement: str | None, activity: str | None) -> bool:

@@ -30,6 +30,17 @@ MANY_COLUMNS: Final = ("", "true", "var", "counted", "var", "accuracy", "var", "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Bar:
+    """An accuracy in percent beside the published one: of a claim on walkers, or on the recordings of a data set."""
+
+    group: str
+    method: str
+    ours: float
+    published: float
+    real: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
     """Everything about one paper: synthetic results, real ones (None where none were asked for), times."""
 
@@ -44,6 +55,26 @@ class Report:
         """Every walk and recording that was counted."""
         made = [row for result in self.results for row in result.rows or ()]
         return made + [row for found in self.measured or () for row in found.rows]
+
+    @property
+    def bars(self) -> list[Bar]:
+        """Every accuracy that has a published one beside it, by what it is about: the papers' Figure 12."""
+        made = [
+            Bar(group=claim.about, method=claim.method, ours=ours, published=claim.percent, real=False)
+            for claim in self.paper.claims
+            if (ours := claimed(claim, self.results)) is not None
+        ]
+        return made + [
+            Bar(
+                group=f"{row.condition.label} ({row.dataset})",
+                method=row.method.label,
+                ours=row.figures.accuracy,
+                published=row.claim,
+                real=True,
+            )
+            for row in self.measured or ()
+            if row.claim is not None and row.figures.accuracy is not None
+        ]
 
     def text(self) -> str:
         """Return it for a terminal."""

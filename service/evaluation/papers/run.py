@@ -70,5 +70,6 @@ async def _real(
     if not used or not files:
         return []
     chosen = [choice(method, preset) for method in used]
-    rows = await evaluate(files, chosen, jobs=jobs, lsb_per_g=lsb_per_g, progress=progress)
-    return measured(of, list(zip(used * len(files), rows, strict=True)))
+    rows = await evaluate([each.file for each in files], chosen, jobs=jobs, lsb_per_g=lsb_per_g, progress=progress)
+    counted = zip([(each, method) for each in files for method in used], rows, strict=True)
+    return measured(of, [(method, row) for (each, method), row in counted if each.takes(method)])

@@ -1,0 +1,107 @@
+/**
+ * The table of finished trials, in the columns of Wang 2018's Table 4, with means, true steps to enter, and deleting.
+ */
+
+import { button, el, numberField, setText } from "./dom.js";
+import { plural } from "./format.js";
+import { COLUMNS, cells, means, trueSteps } from "./trial_words.js";
+
+/** How long a first press of Delete waits for the second. */
+const SURE_MS = 4_000;
+
+export class TrialTable {
+  element;
+  #body = el("tbody");
+  #means = el("ul", { className: "plain means" });
+  #tell;
+  #shown = "";
+
+  /** `tell` has `truth(number, steps)` and `remove(number)`. */
+  constructor(tell) {
+    this.#tell = tell;
+    const heads = COLUMNS.map(({ title, number }) => (
+      el("th", { role: "columnheader", scope: "col", className: number ? "number" : "" }, title)));
+    heads.push(el("th", { role: "columnheader", scope: "col" }, el("span", { className: "unseen" }, "Delete")));
+    // Roles are said in full: on a narrow screen the style sheet lays rows out as blocks, which would lose them.
+    const table = el("table", { role: "table" },
+      el("caption", {}, "Finished trials"), el("thead", {}, el("tr", {}, ...heads)), this.#body);
+    const csv = el("a", { href: "api/v1/trials/table.csv", download: "trials.csv" }, "Download as CSV");
+    csv.className = "button";
+    this.element = el("section", { className: "finished", hidden: true, "aria-label": "Finished trials" },
+      el("div", { className: "sideways", tabIndex: 0, role: "region", "aria-label": "Table of trials" }, table),
+      el("h3", {}, "Mean accuracy"), this.#means, csv);
+  }
+
+  /** Show the done ones of `trials`; a field that is being filled in stays as it is. */
+  show(trials, name) {
+    this.element.hidden = trials.length === 0;
+    const shown = JSON.stringify([trials, trials.flatMap(({ rows }) => rows.map(({ device }) => name(device)))]);
+    if (shown === this.#shown || this.#isEdited) return;
+    this.#shown = shown;
+    const held = this.#body.contains(document.activeElement) && document.activeElement.getAttribute("aria-label");
+    this.#body.replaceChildren(...trials.flatMap((trial) => this.#rows(trial, name)));
+    if (held) this.#body.querySelector(`[aria-label="${CSS.escape(held)}"]`)?.focus();
+    const mean = means(trials, name);
+    this.#means.replaceChildren(...mean.map(({ title, text, rows: count }) => (
+      el("li", {}, el("span", {}, title), el("b", {}, text), el("small", {}, plural(count, "row"))))));
+    if (mean.length === 0) this.#means.append(el("li", { className: "hint" }, "Enter the true steps to see it."));
+  }
+
+  get #isEdited() {
+    const active = document.activeElement;
+    return this.#body.contains(active) && active.matches("input") && active.value !== active.defaultValue;
+  }
+
+  #rows(trial, name) {
+    return cells(trial, name).flatMap((row, i) => {
+      const own = COLUMNS.map((column) => this.#cell(trial, row, column, i === 0));
+      const remove = el("td", { role: "cell", className: "last" }, i === 0 ? this.#remove(trial, row.item) : null);
+      const doubt = el("tr", { role: "row", className: "doubt" }, el("td", { role: "cell", colspan: "9" }, row.note));
+      const line = el("tr", { role: "row", className: i === 0 ? "first" : "" }, ...own, remove);
+      return row.note ? [line, doubt] : [line];
+    });
+  }
+
+  /** The true steps belong to the trial: its first row has the field, the others repeat them. */
+  #cell(trial, row, { key, title, number }, first) {
+    const value = key === "truth" && first ? this.#truth(trial, row) : row[key];
+    return el("td", { role: "cell", className: number ? "number" : "", "data-title": title }, value);
+  }
+
+  #truth(trial, { item }) {
+    const before = trial.true_steps == null ? "" : String(trial.true_steps);
+    const field = numberField({
+      defaultValue: before, placeholder: "?",
+      "aria-label": `True steps of ${item}`,
+      onchange: () => this.#enter(trial.number, field),
+      onkeydown: (event) => event.key === "Enter" && field.blur(),
+    });
+    return field;
+  }
+
+  #enter(number, field) {
+    const steps = trueSteps(field.value);
+    if (steps !== null) this.#tell.truth(number, steps);
+  }
+
+  /** Deleting takes two presses; the button says so in between. */
+  #remove({ number }, item) {
+    let sure = false;
+    const say = (text, name) => {
+      setText(remove, text);
+      remove.setAttribute("aria-label", name);
+    };
+    const unsure = () => {
+      sure = false;
+      say("Delete", `Delete ${item}`);
+    };
+    const press = () => {
+      if (sure) return this.#tell.remove(number);
+      sure = true;
+      say("Sure?", `Press again to delete ${item}`);
+      return setTimeout(unsure, SURE_MS);
+    };
+    const remove = button("Delete", press, { className: "quiet", "aria-label": `Delete ${item}` });
+    return remove;
+  }
+}
