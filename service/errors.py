@@ -7,6 +7,7 @@
     ├── SnapshotError       a snapshot of another counter, version or parameters
     ├── CounterError        a counter cannot be built: unknown name, or a sensor the device lacks
     ├── LinkError           a link could not be made or was lost; `reason` is a LinkFault
+    ├── StoreError          something could not be stored or read; `reason` is a StoreFault
     ├── LearningError       a walk from which a counter's parameters cannot be learnt
     ├── NotNowError         what was asked for is possible, but not at this moment
     ├── UnknownDeviceError  no device of that id
@@ -90,6 +91,40 @@ class LinkError(SteplinkError):
         super().__init__(why)
         self.reason = reason
         self.why = why
+
+
+class StoreFault(StrEnum):
+    """Why something could not be stored or read."""
+
+    FULL = "full"
+    READ_ONLY = "read_only"
+    IO = "io"
+    LOCKED = "locked"
+    BUSY = "busy"
+    CLOSED = "closed"
+    CORRUPT = "corrupt"
+    FOREIGN = "foreign"
+    NEWER = "newer"
+    REFUSED = "refused"
+    GONE = "gone"
+
+
+PASSING_FAULTS = frozenset({StoreFault.FULL, StoreFault.READ_ONLY, StoreFault.IO, StoreFault.LOCKED, StoreFault.BUSY})
+"""Faults that end by themselves or by somebody's help outside: the same request may succeed later."""
+
+
+class StoreError(SteplinkError):
+    """Something that could not be stored or read."""
+
+    def __init__(self, reason: StoreFault, why: str) -> None:
+        super().__init__(why)
+        self.reason = reason
+        self.why = why
+
+    @property
+    def is_passing(self) -> bool:
+        """Whether the same request may succeed later."""
+        return self.reason in PASSING_FAULTS
 
 
 class LearningError(SteplinkError):
