@@ -74,7 +74,7 @@ def measured(name: str, recordings: Path) -> list[float]:
 
 def printed(name: str) -> list[float]:
     """The figures of a counter's row in the guide."""
-    (line,) = re.findall(rf"^\| {name} \|(.*)\|$", GUIDE.read_text("utf-8"), flags=re.M)
+    (line,) = re.findall(rf"^\| {name} \|(.*)\|$", GUIDE.read_text("utf-8"), flags=re.MULTILINE)
     return [float(re.findall(r"[\d.]+", cell)[0]) for cell in line.split("|")]
 
 
