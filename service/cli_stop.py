@@ -33,9 +33,18 @@ class Stopped(KeyboardInterrupt):
 def stopped_at_once() -> Iterator[None]:
     """Raise Stopped at a signal; after GRACE_S, if the process still runs, end it without further ado."""
     before = [signal.signal(number, _stop) for number in _SIGNALS]
+    report = sys.unraisablehook
+
+    def unless_stopped(lost: sys.UnraisableHookArgs) -> None:
+        """Report what nothing can catch, but not a signal that came within a compiler's callback."""
+        if not isinstance(lost.exc_value, Stopped):
+            report(lost)
+
+    sys.unraisablehook = unless_stopped
     try:
         yield
     finally:
+        sys.unraisablehook = report
         for number, handler in zip(_SIGNALS, before, strict=True):
             signal.signal(number, handler)
 

@@ -21,6 +21,18 @@ with stopped_at_once():
             pass
 """
 
+WITHIN_A_CALLBACK = """
+import ctypes, time
+from service.cli_stop import stopped_at_once
+with stopped_at_once():
+    @ctypes.CFUNCTYPE(None)
+    def callback():
+        print("ready", flush=True)
+        time.sleep(60)
+    callback()
+    time.sleep(60)
+"""
+
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_is_an_exception_with_its_exit_code(number, code, monkeypatch):
@@ -41,9 +53,12 @@ class FakeTimer:
 
 
 @pytest.mark.full
-def test_who_swallows_the_exception_is_ended_all_the_same():
+@pytest.mark.parametrize(
+    ("code", "more"), [(SWALLOWS, "ready\n"), (WITHIN_A_CALLBACK, "")], ids=["handler", "callback"]
+)
+def test_who_swallows_the_exception_is_ended_all_the_same(code, more):
     with subprocess.Popen(
-        [sys.executable, "-c", SWALLOWS], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout.readline() == "ready\n"
         began = time.monotonic()
@@ -51,5 +66,5 @@ def test_who_swallows_the_exception_is_ended_all_the_same():
         out, err = process.communicate(timeout=20)
     assert GRACE_S * 0.9 < time.monotonic() - began < GRACE_S + 1
     assert process.returncode == 130
-    assert out == "ready\n"
+    assert out == more
     assert err == "steplink: stopped before it was done\n"
