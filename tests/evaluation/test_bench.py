@@ -92,9 +92,10 @@ def test_live_packets_are_a_bracelets():
 def test_counting_a_file_ends_with_the_steps_of_the_signal(monkeypatch):
     counted = []
     monkeypatch.setattr(
-        bench, "_count_fast", lambda name, block: counted.append((name, len(block), count(block).steps))
+        bench, "_count_fast", lambda name, block: counted.append((name, len(block), count(block, name).steps))
     )
     monkeypatch.setattr(bench, "RUNS", 1)
     block = yardsticks.walk(3000)
-    bench._from_file(block)
-    assert counted == [(registry.DEFAULT, 3000, count(block).steps)] * 2
+    names = ["double_threshold", "gyro_zero_crossing"]
+    assert len(list(bench._from_file(names, block))) == 2
+    assert counted == [(name, 3000, count(block, name).steps) for name in names for _ in range(2)]
