@@ -60,6 +60,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from service.counters import double_threshold_ahead as ahead
 from service.counters import double_threshold_kernel as kernel
 from service.counters.contract import choice, parameter
 from service.counters.streaming import Kernel, KernelCounter
@@ -134,7 +135,7 @@ _KERNEL: Final = Kernel(
     scan=kernel.scan,
     close=kernel.close,
     stop=kernel.stop,
-    likely=kernel.likely,
+    likely=ahead.likely,
     next_index=kernel.NEXT,
     constants=kernel.CONSTANTS,
     row=kernel.ROW,

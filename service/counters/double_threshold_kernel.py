@@ -13,8 +13,6 @@ from collections.abc import MutableSequence, Sequence
 from math import sqrt
 from typing import Final
 
-from service.samples import Likely
-
 # Constants of an instance.
 Y_WEIGHT: Final = 0  # 1 for the norm, 0 for √(X²+Z²)
 HALF: Final = 1  # N of (7), (8)
@@ -92,6 +90,9 @@ WARM_UP: Final = 5
 """First samples of a stretch in which no extremum counts: the mean (5) is not full yet."""
 
 NEVER: Final = 1e300
+
+MOST: Final = 1e6
+"""g; no sensor measures as much."""
 
 BRIDGE: Final = 150.0
 """A bout goes on over a gap if the two steps around it lie less than 3 s apart."""
@@ -187,53 +188,6 @@ def stop(s: State) -> None:
     s[BOUT_PEAKS] = 0.0
 
 
-def likely(s: State) -> list[Likely]:
-    """Return every peak that can still become a step: index, height, and whether it passes what is in force.
-
-    Those are the held ones of a bout that can still become certain, and all undecided ones that no rule excludes yet.
-    One passes if it does by the thresholds of the last window and no other that does lies too near before it.
-    """
-    peaks, last = s[BOUT_PEAKS], s[LAST]
-    waiting = _waiting(s, peaks, last) if s[COUNT] > 0.0 else []
-    if not 0.0 < peaks < s[BOUT] or s[CREDIT] == 0.0:
-        return waiting
-    first = waiting[0][0] if waiting else s[NEXT] - s[HALF]
-    if min(first, s[NEXT] - s[HALF]) - last >= s[MAX_SPACING]:
-        return waiting
-    held = range(HELD, HELD + int(peaks) * ROW, ROW)
-    return [(s[i + 1], s[i + 3] - s[i + 4], True) for i in held] + waiting
-
-
-def _waiting(s: State, peaks: float, last: float) -> list[Likely]:
-    """Return the undecided peaks that no rule excludes yet."""
-    found: list[Likely] = []
-    nearest, rest, in_force = s[MIN_SPACING], s[REST], s[HIGH_KNOWN] > 0.0 and s[LOW_KNOWN] > 0.0
-    low = s[LOW] if in_force else s[FILTERED]
-    upper = (s[HIGH] + low) / 2.0
-    after = sure_after = last + nearest if peaks > 0.0 else -1.0
-    short = 0.0 if s[CREDIT] > 0.0 else s[BOUT] - peaks - 1.0
-    q, end = QUEUE + int(s[HEAD]) * ENTRY, QUEUE + int(s[CAPACITY]) * ENTRY
-    for _ in range(int(s[COUNT])):
-        at, peak, known = s[q + AT], s[q + PEAK], s[q + CLOSED] > 0.0
-        excluded = at <= after or (
-            known and (peak <= s[q + UPPER] or (s[q + SEEN] >= s[VALLEYS] and s[q + VALLEY] >= s[q + LOWER]))
-        )
-        q += ENTRY
-        if q == end:
-            q = QUEUE
-        if excluded:
-            continue
-        if short > 0.0:
-            short -= 1.0  # a reference at most
-            continue
-        height = peak - low
-        passes = in_force and peak > upper and height >= rest and at > sure_after
-        if passes:
-            sure_after = at + nearest
-        found.append((at, height if height > 0.0 else 0.0, passes))  # noqa: FURB136  # a call costs more
-    return found
-
-
 def _take(s: State, k: float, out: State, rows: int) -> int:
     """Take the extremum that is certain and the windows that are over before sample k."""
     ripe = s[RIPE]
@@ -258,7 +212,9 @@ def _extremum(s: State, at: float, out: State, rows: int) -> int:
 
 
 def _peak(s: State, at: float, value: float) -> None:
-    """Add a peak to the window's mean and to the queue."""
+    """Add a peak to the window's mean and to the queue; one that no sensor measures would stay in the means."""
+    if value >= MOST:
+        return
     s[PEAK_SUM] += value
     s[PEAKS] += 1.0
     s[COUNT] += 1.0

@@ -70,6 +70,9 @@ from service.samples import Likely
 from service.signals.orientation import advance, horizontal
 from service.signals.orientation import begin as begin_orientation
 
+MOST: Final = 1e12
+"""Sum of the squares of a sample in g, rad/s and µT: a million of each is no measurement."""
+
 SWING_REJECT: Final = 0.5
 """(5): a half-step by the swing is no guess that a bump can have spoilt, so the share need not be milder."""
 
@@ -90,6 +93,8 @@ def begin(
     """Open a stretch at grid index `index`, whose first sample stands for those before it; a certain bout goes on."""
     if s[BOUT_STEPS] < s[BOUT]:
         end_bout(s)
+    if not _measured(ax, ay, az, gx, gy, gz, mx, my, mz):
+        ax, ay, az, gx, gy, gz, mx, my, mz = 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     norm = sqrt(ax * ax + ay * ay + az * az)
     s[FIRST] = s[NEXT] = float(index)
     s[A1] = s[A2] = norm
@@ -123,16 +128,21 @@ def scan(
     k, older, last, rows = int(s[NEXT]), s[A2], s[A1], n
     earliest = int(s[FIRST] + s[DELAY]) + 1
     for i in range(n):
+        a, b, c, d, e, f, g, h, m = ax[i], ay[i], az[i], gx[i], gy[i], gz[i], mx[i], my[i], mz[i]
         slot = RAW + k % LAGS * AXES
-        s[slot], s[slot + 1], s[slot + 2] = ax[i], ay[i], az[i]
-        s[slot + 3], s[slot + 4], s[slot + 5] = gx[i], gy[i], gz[i]
-        s[slot + 6], s[slot + 7], s[slot + 8] = mx[i], my[i], mz[i]
+        if not _measured(a, b, c, d, e, f, g, h, m):  # the sample before stands for it
+            q = RAW + (k - 1) % LAGS * AXES
+            a, b, c, d, e = s[q], s[q + 1], s[q + 2], s[q + 3], s[q + 4]
+            f, g, h, m = s[q + 5], s[q + 6], s[q + 7], s[q + 8]
+        s[slot], s[slot + 1], s[slot + 2] = a, b, c
+        s[slot + 3], s[slot + 4], s[slot + 5] = d, e, f
+        s[slot + 6], s[slot + 7], s[slot + 8] = g, h, m
         _filter(s, k)
         motion = MOTION + k % DEPTH * CHANNELS
         for axis in range(6):
             s[motion + axis] = s[Y1 + 3 + axis]
-        advance(s, ORIENTATION, ax[i], ay[i], az[i], gx[i], gy[i], gz[i], mx[i], my[i], mz[i])
-        s[motion + NORTH], s[motion + EAST] = horizontal(s, ORIENTATION, ax[i], ay[i], az[i])
+        advance(s, ORIENTATION, a, b, c, d, e, f, g, h, m)
+        s[motion + NORTH], s[motion + EAST] = horizontal(s, ORIENTATION, a, b, c)
         x, y, z = s[Y1], s[Y1 + 1], s[Y1 + 2]
         norm = sqrt(x * x + y * y + z * z)
         out[i] = norm
@@ -147,6 +157,11 @@ def scan(
         k += 1
     s[NEXT], s[A2], s[A1] = float(k), older, last
     return rows
+
+
+def _measured(a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float, m: float) -> bool:
+    """Tell whether these are values of a sensor: a NaN or an infinity would stay in the filters for ever."""
+    return a * a + b * b + c * c + d * d + e * e + f * f + g * g + h * h + m * m < MOST
 
 
 def close(s: State, out: State) -> int:

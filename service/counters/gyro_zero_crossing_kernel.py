@@ -95,6 +95,9 @@ MEMORY: Final = 0.5
 CLEARLY: Final = 1.5
 """The axis changes for one of so many times its variance: two axes that share the swing do not alternate."""
 
+MOST: Final = 1e3
+"""rad/s; no gyroscope measures more."""
+
 BRIDGE: Final = 150.0
 """A bout goes on over a gap if the two steps around it lie less than 3 s apart."""
 
@@ -147,7 +150,7 @@ def scan(x: Floats, y: Floats, z: Floats, n: int, s: State, out: State) -> int:
         if k == look:
             look += LOOK_EVERY
             rows = _look(s, k, x[i], y[i], z[i], out, rows)
-            if s[CHOSEN] != chosen or filtered != filtered:  # noqa: PLR0124  # NaN would stay in the filter
+            if s[CHOSEN] != chosen or not -MOST < filtered < MOST:  # what is no rate would stay in the filter
                 chosen = s[CHOSEN]
                 rate = x if chosen == 0.0 else y if chosen == 1.0 else z
                 p1 = p2 = q1 = q2 = r1 = r2 = last = candidate = swept = 0.0
@@ -305,7 +308,7 @@ def _look(s: State, k: float, x: float, y: float, z: float, out: State, rows: in
             mean = s[SUMS + axis] / LOOK_OUT
             if -MAX_BIAS <= mean <= MAX_BIAS:
                 s[BIAS + axis] = mean
-    elif total >= s[REST]:  # NaN is neither
+    elif s[REST] <= total < MOST * MOST:  # NaN is not
         for axis in range(3):
             s[VARIANCE + axis] += MEMORY * (s[SQUARES + axis] - s[VARIANCE + axis])
         if s[AXIS] == LARGEST:

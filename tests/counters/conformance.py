@@ -232,6 +232,20 @@ def check_silence(make: Make, value_g: float) -> None:
     assert update.pending == 0
 
 
+def check_bad_sample(make: Make, bad: float) -> None:
+    """One sample that is no measurement costs no more than what lies near it: the steps after it are as they were."""
+    clean = walk(2400, 2.0, 0.5)
+    broken = clean.copy()
+    broken[900] = bad
+    counts = []
+    for values in (clean, broken):
+        outcome = collect(make(), Signal(values).pieces(), finish=True)
+        assert all(isfinite(step.at_s) and isfinite(step.strength) for step in outcome.steps)
+        counts.append(sum(step.at_s > 36.0 for step in outcome.steps))
+    assert counts[0] >= 10
+    assert abs(counts[1] - counts[0]) <= 1
+
+
 def check_walk(make: Make, step_hz: float, swing_g: float, *, slack: int, moment: float = 0.25) -> None:
     """On a clean walk of 40 steps between two rests at most `slack` are missed or too many.
 

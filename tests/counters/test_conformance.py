@@ -106,6 +106,11 @@ def test_silence_has_no_steps(make, value_g):
     conformance.check_silence(make, value_g)
 
 
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), 1e308])
+def test_a_sample_that_is_no_measurement_costs_what_is_near_it(make, bad):
+    conformance.check_bad_sample(make, bad)
+
+
 @pytest.mark.parametrize("step_hz", [1.1, 1.7, 2.1, 2.9])
 @pytest.mark.parametrize("swing_g", [0.2, 0.6])
 def test_a_clean_walk_is_counted(make, step_hz, swing_g):
