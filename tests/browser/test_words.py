@@ -19,6 +19,7 @@ const lineup = await import("/web/lineup.js");
 const calibration = await import("/web/calibration_words.js");
 const trial = await import("/web/trial_words.js");
 const looks = await import("/web/looks.js");
+const primary = await import("/web/primary.js");
 """
 COUNTERS = [counter_view(kind).model_dump(mode="json") for kind in registry.COUNTERS.values()]
 NAMES = [counter["name"] for counter in COUNTERS]
@@ -95,6 +96,30 @@ def test_what_a_change_does_is_said_before_it_is_done(run: Run) -> None:
     assert said(run, [double], [changed]) == (
         f"A new segment begins: double threshold counts with other parameters, {goes_on}"
     )
+
+
+COUNTS = """
+const { now, confirmed, pending } = primary.counts(a);
+return [primary.shownState(a), now, confirmed, pending, primary.spokenCount(a)];"""
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, ["streaming", "0", "0", 0, "0 steps"]),
+        ({"counter_faults": {"beside": "why"}}, ["streaming", "0", "0", 0, "0 steps"]),
+        ({"counter_faults": {"lead": "why"}}, ["faulted", "–", "–", 0, "not counting"]),
+        ({"counter_faults": {"lead": "why"}, "state": "lost"}, ["lost", "–", "–", 0, "not counting"]),
+        (
+            {"counter_faults": {"lead": "why"}, "steps": 1200, "steps_now": 1203},
+            ["faulted", "1,203", "1,200", 3, "1,203 steps"],
+        ),
+    ],
+)
+def test_a_primary_that_cannot_count_has_not_counted_nothing(
+    run: Run, changes: dict[str, Any], told: list[object]
+) -> None:
+    assert run(COUNTS, {"primary": "lead", "state": "streaming", "steps": 0, "steps_now": 0} | changes) == told
 
 
 def test_only_calibrations_that_the_device_can_do_are_offered(run: Run) -> None:
