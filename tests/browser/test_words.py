@@ -79,6 +79,36 @@ def test_what_is_typed_is_an_override_unless_it_is_the_presets_own(run: Run, tex
     assert run("return lineup.typed(a[0], a[1], a[2]);", [bout, entry, text]) == params
 
 
+@pytest.mark.parametrize(
+    ("sentence", "counter", "named"),
+    [
+        ("autocorrelation.bout = 99: from 1 to 12 steps", "autocorrelation", True),
+        ("autocorrelation.bout = 99: from 1 to 12 steps", "double_threshold", False),
+        ("bout = 99: from 1 to 12 steps", "autocorrelation", True),
+        ("bouts = 99: from 1 to 12 steps", "autocorrelation", False),
+        ("out of order", "autocorrelation", False),
+    ],
+)
+def test_a_refusal_names_a_counters_parameter(run: Run, sentence: str, counter: str, *, named: bool) -> None:
+    assert run("return lineup.named(a[0], a[1], 'bout', { params: { bout: 99 } });", [sentence, counter]) is named
+    by_full_name = sentence.startswith(f"{counter}.")
+    assert run("return lineup.named(a[0], a[1], 'bout', { params: {} });", [sentence, counter]) is by_full_name
+
+
+@pytest.mark.parametrize(
+    ("sentence", "blames"),
+    [
+        ("steps = 3: from 10 to 1000 steps", True),
+        ("body.steps: Input should be greater than or equal to 10", True),
+        ("seconds = 9.0: from 10 to 600 s", True),
+        ("the device does not stream: connect it first", False),
+        ("stepsize = 3", False),
+    ],
+)
+def test_a_refusal_of_a_calibration_may_be_of_what_was_typed(run: Run, sentence: str, *, blames: bool) -> None:
+    assert run("return calibration.blamesAmount(a);", sentence) is blames
+
+
 def said(run: Run, before: list[dict[str, Any]], after: list[dict[str, Any]]) -> str:
     sentence: str = run("return lineup.consequence(a[0], a[1], 1234);", [before, after])
     return sentence

@@ -2,9 +2,9 @@
  * The table of finished trials, in the columns of Wang 2018's Table 4, with means, true steps to enter, and deleting.
  */
 
-import { button, el, numberField, setText } from "./dom.js";
+import { button, el, mark, numberField, setText } from "./dom.js";
 import { plural } from "./format.js";
-import { COLUMNS, cells, means, trueSteps } from "./trial_words.js";
+import { COLUMNS, REFUSED, cells, means, trueSteps } from "./trial_words.js";
 
 /** How long a first press of Delete waits for the second. */
 const SURE_MS = 4_000;
@@ -15,8 +15,10 @@ export class TrialTable {
   #means = el("ul", { className: "plain means" });
   #tell;
   #shown = "";
+  /** What was typed as true steps and not taken, by trial: `{text, wrong}`. */
+  #typed = new Map();
 
-  /** `tell` has `truth(number, steps)` and `remove(number)`. */
+  /** `tell` has `truth(number, steps)`, which resolves to `{status, error}`, and `remove(number)`. */
   constructor(tell) {
     this.#tell = tell;
     const heads = COLUMNS.map(({ title, number }) => (
@@ -74,14 +76,27 @@ export class TrialTable {
       defaultValue: before, placeholder: "?",
       "aria-label": `True steps of ${item}`,
       onchange: () => this.#enter(trial.number, field),
+      oninput: () => mark(field, false),
       onkeydown: (event) => event.key === "Enter" && field.blur(),
     });
+    const { text = before, wrong = false } = this.#typed.get(trial.number) ?? {};
+    field.value = text;
+    mark(field, wrong);
     return field;
   }
 
-  #enter(number, field) {
-    const steps = trueSteps(field.value);
-    if (steps !== null) this.#tell.truth(number, steps);
+  /** What the server does not take stays as it was typed, marked where it is wrong. */
+  async #enter(number, field) {
+    const text = field.value;
+    const steps = trueSteps(text);
+    this.#typed.delete(number);
+    if (steps === null) return;
+    this.#typed.set(number, { text, wrong: false });
+    const { status, error } = await this.#tell.truth(number, steps);
+    if (this.#typed.get(number)?.text !== text) return;
+    if (error === null) this.#typed.delete(number);
+    else this.#typed.set(number, { text, wrong: status === REFUSED });
+    mark(field, status === REFUSED);
   }
 
   /** Deleting takes two presses; the button says so in between. */
