@@ -169,6 +169,23 @@ def test_deleting_a_trial_takes_two_presses(scripted: Scripted) -> None:
     assert server.asked == [(f"DELETE {PATH}/1", None)]
 
 
+@pytest.mark.parametrize("width", [320, 390])
+def test_on_a_narrow_screen_a_finished_trials_wrists_stand_side_by_side(scripted: Scripted, width: int) -> None:
+    server = scripted(device(), device(**RIGHT), viewport={"width": width, "height": 800})
+    _, panel = opened(server, done(1), done(2, name="run"))
+    expect(panel.locator("tbody")).to_have_count(2)
+    for key in ("device", "steps", "accuracy"):
+        boxes = [cell.bounding_box() for cell in panel.locator(f"td[data-key={key}]").all()]
+        first, second, below, _ = [box for box in boxes if box]
+        assert first["y"] == second["y"] < below["y"]
+        assert first["x"] + first["width"] <= second["x"]
+    note = panel.get_by_role("cell", name="the device was lost").first.bounding_box()
+    right = panel.locator("td[data-key=device]").nth(1).bounding_box()
+    assert note is not None
+    assert right is not None
+    assert note["x"] == right["x"]
+
+
 @pytest.mark.parametrize("width", [320, 390, 800, 1440])
 def test_the_panel_fits_and_its_targets_are_large_enough(scripted: Scripted, width: int) -> None:
     server = scripted(device(), device(**RIGHT), viewport={"width": width, "height": 800})

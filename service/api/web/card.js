@@ -179,8 +179,9 @@ export class Card {
     this.#text("packets", whole(device.packets));
     this.#text("packets-more", `${whole(device.packets_bad)} bad, ${whole(device.packets_duplicate)} repeated`);
     this.#text("lost", percent(device.samples_lost, device.samples));
-    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`
-      + (device.samples_saturated ? `, ${whole(device.samples_saturated)} at their limit` : ""));
+    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`);
+    this.#text("limit", whole(device.samples_saturated));
+    this.#fields["limit-row"].hidden = !device.samples_saturated;
     this.#text("gaps", whole(device.gaps));
     this.#text("gaps-more", plural(device.reboots, "restart"));
     this.#text("rate", measured(device.measured_rate_hz ?? device.rate_hz, 1, "Hz"));

@@ -240,13 +240,14 @@ export class Plot {
     this.#line(left, PAD.top, left, bottom);
   }
 
-  /** Mark the primary's steps on the signal: hollow while they are likely, solid once they count. */
+  /** Mark the primary's steps where there is a signal to mark: hollow while they are likely, solid once they count. */
   #marks({ fromS, bottom, x, y }, nowMs, motion) {
     const onSignal = ({ atS, peak }) => {
       const g = peak ?? this.#trace.valueAt(atS);
       return g === null ? PAD.top + 6 : y(g);
     };
-    const shown = ({ atS }) => atS >= fromS - 0.2;
+    const begun = Math.max(fromS - 0.2, this.#trace.beginS);
+    const shown = ({ atS }) => atS >= begun;
     for (const step of this.#trace.likely.filter(shown)) {
       const mark = this.#shape(step.counter, x(step.atS), onSignal(step), 4.5);
       paintLikely(this.#context, mark.shape, { ...mark.paint, alpha: presence(step, nowMs, motion) });
