@@ -119,6 +119,22 @@ def test_a_refusal_is_told_as_the_servers_sentence(scripted: Scripted) -> None:
     server.errors.clear()
 
 
+def test_the_amount_that_is_refused_is_marked_and_stays(scripted: Scripted) -> None:
+    server = scripted(device())
+    server.api[f"POST {PATH}"] = (422, {"detail": "steps = 3: from 10 to 1000 steps"})
+    _, panel = opened(server)
+    amount = panel.get_by_label("How many")
+    amount.fill("3")
+    panel.get_by_role("button", name="Start").click()
+    expect(panel.get_by_role("alert")).to_have_text("steps = 3: from 10 to 1000 steps")
+    expect(amount).to_be_focused()
+    expect(amount).to_have_attribute("aria-invalid", "true")
+    expect(amount).to_have_value("3")
+    amount.fill("30")
+    expect(amount).not_to_have_attribute("aria-invalid", "true")
+    server.errors.clear()
+
+
 def test_a_server_that_does_not_answer_is_told_until_it_does(scripted: Scripted) -> None:
     server = scripted(device())
     page, panel = opened(server, calibration(1, state="recording"))

@@ -96,6 +96,20 @@ def test_a_refusal_is_shown_as_the_servers_sentence_and_its_field_is_pointed_at(
     server.errors.clear()
 
 
+def test_the_counter_that_a_refusal_names_is_pointed_at(scripted: Scripted) -> None:
+    server = serving(scripted(device()))
+    server.api[f"PUT {LINEUP}"] = (422, {"detail": "autocorrelation.bout = 99: from 1 to 12 steps"})
+    dialog = opened(server.open())
+    dialog.get_by_role("checkbox", name="autocorrelation").check()
+    for name in ("double_threshold", "autocorrelation"):
+        choice(dialog, name).locator("summary").click()
+        parameter(dialog, name, "bout").fill("99")
+    dialog.get_by_role("button", name="Apply").click()
+    expect(parameter(dialog, "autocorrelation", "bout")).to_be_focused()
+    expect(dialog.locator("[aria-invalid]")).to_have_count(1)
+    server.errors.clear()
+
+
 @pytest.mark.parametrize("reached", [True, False])
 def test_a_server_that_gives_no_counters_is_told(scripted: Scripted, reached: bool) -> None:
     server = serving(scripted(device()))

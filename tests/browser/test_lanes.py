@@ -123,6 +123,43 @@ def test_a_counter_that_cannot_count_says_why_instead_of_marks(scripted: Scripte
     expect(page.locator(".lane[data-counter=double_threshold] canvas")).to_be_visible()
 
 
+def keys(page: Page) -> list[str]:
+    return [" ".join(text.split()) for text in page.locator(".key:visible").all_inner_texts()]
+
+
+def test_the_key_explains_what_the_plot_carries_and_nothing_else(scripted: Scripted) -> None:
+    server, page = standing(scripted, "fusion")
+    assert keys(page) == []
+    feed(server, signal(0, 10, bands=[]))
+    assert keys(page) == ["signal", "likely counted step", "no data"]
+    feed(server, signal(10, 2))
+    assert keys(page) == ["signal", "upper threshold", "lower threshold", "likely counted step", "no data"]
+    expect(page.get_by_role("img", name="its thresholds")).to_be_visible()
+
+
+def test_a_primary_that_cannot_count_shows_dashes_and_says_why_in_sight(scripted: Scripted) -> None:
+    why = "the device sends 8 Hz; at least 10 Hz are needed"
+    faulted = device(steps=0, steps_now=0, counter_faults={"double_threshold": why})
+    server = scripted(faulted, viewport={"width": 390, "height": 844})
+    page = server.open()
+    for name in ("steps-now", "steps", "cadence"):
+        expect(page.locator(f".card [data-f={name}]")).to_have_text("–")
+    expect(page.locator("[data-f=state]")).to_have_text("Live, not counting")
+    for name in ("notice", "why"):
+        expect(page.locator(f"[data-f={name}]")).to_contain_text(why)
+    box = page.locator("[data-f=notice]").bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] <= 844
+    assert keys(page) == []
+    assert page.title() == "– steps · steplink"
+    able = device(steps=0, steps_now=0)
+    server.send({"type": "device", "device": able["id"], "at": AT, "value": able})
+    expect(page.locator("[data-f=state]")).to_have_text("Live")
+    expect(page.locator("[data-f=steps-now]")).to_have_text("0")
+    for name in ("notice", "why"):
+        expect(page.locator(f"[data-f={name}]")).to_be_hidden()
+
+
 def marks(page: Page) -> list[tuple[float, int]]:
     """The primary's marks in its lane: where each is, and how many pixels of its colour it has."""
     found: list[list[tuple[int, int]]] = []

@@ -184,6 +184,17 @@ def test_a_likely_step_goes_where_it_is_counted_or_taken_back(run: Run) -> None:
     assert run(body) == [[[2, 0], [3, 1]], [False, True]]
 
 
+def test_what_a_trace_carries_is_what_is_drawn(run: Run) -> None:
+    body = """
+    const trace = new Trace();
+    const before = trace.carried(trace.edge(0));
+    trace.addSignal({ from_s: 0, rate_hz: 50, values: [1, 1] }, 0);
+    const bare = trace.carried(trace.edge(0));
+    trace.addSignal({ from_s: 0.04, rate_hz: 50, values: [1], bands: [{ from_s: 0, to_s: 1, upper: 1 }] }, 0);
+    return [before, bare, trace.carried(trace.edge(0))].map(({ signal, upper, lower }) => [signal, upper, lower]);"""
+    assert run(body) == [[False, False, False], [True, False, False], [True, True, False]]
+
+
 def test_a_session_begun_anew_begins_its_trace_anew(run: Run) -> None:
     """A service that was restarted counts no reboot, but the bracelet's time may lie before what was drawn."""
     body = """

@@ -74,6 +74,17 @@ def test_battery_packets_and_losses_are_told(scripted: Scripted) -> None:
     }  # fmt: skip
 
 
+def test_samples_at_the_sensors_limit_stand_apart_from_lost_ones(scripted: Scripted) -> None:
+    server = scripted(device(samples_saturated=0))
+    page = server.open()
+    expect(field(page, "limit-row")).to_be_hidden()
+    now = device(samples_saturated=64)
+    server.send({"type": "device", "device": now["id"], "at": now["since"], "value": now})
+    expect(field(page, "limit")).to_have_text("64")
+    expect(field(page, "limit-row")).to_contain_text("steps may be missing")
+    expect(field(page, "lost-more")).to_have_text("100 of 10,000")
+
+
 def test_tallies_are_kept_up_to_date_by_the_feed(scripted: Scripted) -> None:
     server = scripted(device(packets=10))
     page = server.open()

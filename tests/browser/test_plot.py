@@ -99,6 +99,12 @@ def test_before_the_first_sample_nothing_is_drawn_but_axes(scripted: Scripted) -
     assert sum(columns(page, "grid")) > 100
 
 
+def test_a_step_before_the_first_sample_is_not_marked(scripted: Scripted) -> None:
+    server, page = still(scripted)
+    feed(server, signal(20, 5), step(1, 19.125, 40), step(2, 21.125, 41))
+    assert len(clusters(columns(page, "step"))) == 1
+
+
 def test_signal_thresholds_and_marks_are_drawn_and_the_marks_lie_on_the_steps(scripted: Scripted) -> None:
     server, page = still(scripted)
     feed(server, signal(0, 10), *[step(i, 3.125 + i, 40 + i) for i in range(5)])

@@ -88,11 +88,19 @@ def test_both_counts_live_beside_each_other_until_it_is_finished(scripted: Scrip
     server.api[f"GET {PATH}"] = listing(trial(1, rows=rows))
     expect(run.locator(".versus strong")).to_have_text(["141", "142"])
     expect(run).to_contain_text("the device was lost for 2 s")
-    run.get_by_label("True steps").fill("1,140")
+    truth = run.get_by_label("True steps")
+    truth.fill("-3")
+    server.api[f"POST {PATH}/1/finish"] = (422, {"detail": "true_steps = -3: from 0 to 100000 steps"})
+    run.get_by_role("button", name="Finish").click()
+    expect(truth).to_have_attribute("aria-invalid", "true")
+    expect(truth).to_have_value("-3")
+    server.api[f"POST {PATH}/1/finish"] = trial(1, state="settling")
+    truth.fill("1,140")
     server.api[f"GET {PATH}"] = listing(trial(1, state="settling"))
     run.get_by_role("button", name="Finish").click()
     expect(run.get_by_role("status")).to_have_text("Deciding the last steps…")
-    assert server.asked == [(f"POST {PATH}/1/finish", {"true_steps": 1140})]
+    assert [body for _, body in server.asked] == [{"true_steps": -3}, {"true_steps": 1140}]
+    server.errors.clear()
     server.api[f"GET {PATH}"] = listing(done(1))
     expect(panel.get_by_role("table")).to_be_visible()
     expect(run).to_have_count(0)
@@ -121,9 +129,14 @@ def test_true_steps_may_come_later_and_a_refusal_is_told(scripted: Scripted) -> 
     field.fill("many")
     page.keyboard.press("Enter")
     expect(panel.get_by_role("alert")).to_have_text("true_steps: a whole number from 0 to 100000")
+    server.api[f"GET {PATH}"] = listing(done(1, true_steps=None), done(2, name="run", rows=[row("left", 9)]))
+    expect(panel.get_by_label("True steps of run")).to_be_visible(timeout=10_000)
+    expect(field).to_have_value("many")
+    expect(field).to_have_attribute("aria-invalid", "true")
     server.api[f"PATCH {PATH}/1"] = done(1)
     server.api[f"GET {PATH}"] = listing(done(1))
     field.fill("130")
+    expect(field).not_to_have_attribute("aria-invalid", "true")
     page.keyboard.press("Enter")
     expect(panel.get_by_role("cell", name="98.46")).to_be_visible()
     expect(panel.get_by_role("alert")).to_be_hidden()
@@ -154,6 +167,23 @@ def test_deleting_a_trial_takes_two_presses(scripted: Scripted) -> None:
     panel.get_by_role("button", name="Press again to delete normal walk").click()
     expect(panel.get_by_role("table")).to_be_hidden()
     assert server.asked == [(f"DELETE {PATH}/1", None)]
+
+
+@pytest.mark.parametrize("width", [320, 390])
+def test_on_a_narrow_screen_a_finished_trials_wrists_stand_side_by_side(scripted: Scripted, width: int) -> None:
+    server = scripted(device(), device(**RIGHT), viewport={"width": width, "height": 800})
+    _, panel = opened(server, done(1), done(2, name="run"))
+    expect(panel.locator("tbody")).to_have_count(2)
+    for key in ("device", "steps", "accuracy"):
+        boxes = [cell.bounding_box() for cell in panel.locator(f"td[data-key={key}]").all()]
+        first, second, below, _ = [box for box in boxes if box]
+        assert first["y"] == second["y"] < below["y"]
+        assert first["x"] + first["width"] <= second["x"]
+    note = panel.get_by_role("cell", name="the device was lost").first.bounding_box()
+    right = panel.locator("td[data-key=device]").nth(1).bounding_box()
+    assert note is not None
+    assert right is not None
+    assert note["x"] == right["x"]
 
 
 @pytest.mark.parametrize("width", [320, 390, 800, 1440])

@@ -19,6 +19,7 @@ const lineup = await import("/web/lineup.js");
 const calibration = await import("/web/calibration_words.js");
 const trial = await import("/web/trial_words.js");
 const looks = await import("/web/looks.js");
+const primary = await import("/web/primary.js");
 """
 COUNTERS = [counter_view(kind).model_dump(mode="json") for kind in registry.COUNTERS.values()]
 NAMES = [counter["name"] for counter in COUNTERS]
@@ -78,6 +79,36 @@ def test_what_is_typed_is_an_override_unless_it_is_the_presets_own(run: Run, tex
     assert run("return lineup.typed(a[0], a[1], a[2]);", [bout, entry, text]) == params
 
 
+@pytest.mark.parametrize(
+    ("sentence", "counter", "named"),
+    [
+        ("autocorrelation.bout = 99: from 1 to 12 steps", "autocorrelation", True),
+        ("autocorrelation.bout = 99: from 1 to 12 steps", "double_threshold", False),
+        ("bout = 99: from 1 to 12 steps", "autocorrelation", True),
+        ("bouts = 99: from 1 to 12 steps", "autocorrelation", False),
+        ("out of order", "autocorrelation", False),
+    ],
+)
+def test_a_refusal_names_a_counters_parameter(run: Run, sentence: str, counter: str, *, named: bool) -> None:
+    assert run("return lineup.named(a[0], a[1], 'bout', { params: { bout: 99 } });", [sentence, counter]) is named
+    by_full_name = sentence.startswith(f"{counter}.")
+    assert run("return lineup.named(a[0], a[1], 'bout', { params: {} });", [sentence, counter]) is by_full_name
+
+
+@pytest.mark.parametrize(
+    ("sentence", "blames"),
+    [
+        ("steps = 3: from 10 to 1000 steps", True),
+        ("body.steps: Input should be greater than or equal to 10", True),
+        ("seconds = 9.0: from 10 to 600 s", True),
+        ("the device does not stream: connect it first", False),
+        ("stepsize = 3", False),
+    ],
+)
+def test_a_refusal_of_a_calibration_may_be_of_what_was_typed(run: Run, sentence: str, *, blames: bool) -> None:
+    assert run("return calibration.blamesAmount(a);", sentence) is blames
+
+
 def said(run: Run, before: list[dict[str, Any]], after: list[dict[str, Any]]) -> str:
     sentence: str = run("return lineup.consequence(a[0], a[1], 1234);", [before, after])
     return sentence
@@ -95,6 +126,30 @@ def test_what_a_change_does_is_said_before_it_is_done(run: Run) -> None:
     assert said(run, [double], [changed]) == (
         f"A new segment begins: double threshold counts with other parameters, {goes_on}"
     )
+
+
+COUNTS = """
+const { now, confirmed, pending } = primary.counts(a);
+return [primary.shownState(a), now, confirmed, pending, primary.spokenCount(a)];"""
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, ["streaming", "0", "0", 0, "0 steps"]),
+        ({"counter_faults": {"beside": "why"}}, ["streaming", "0", "0", 0, "0 steps"]),
+        ({"counter_faults": {"lead": "why"}}, ["faulted", "–", "–", 0, "not counting"]),
+        ({"counter_faults": {"lead": "why"}, "state": "lost"}, ["lost", "–", "–", 0, "not counting"]),
+        (
+            {"counter_faults": {"lead": "why"}, "steps": 1200, "steps_now": 1203},
+            ["faulted", "1,203", "1,200", 3, "1,203 steps"],
+        ),
+    ],
+)
+def test_a_primary_that_cannot_count_has_not_counted_nothing(
+    run: Run, changes: dict[str, Any], told: list[object]
+) -> None:
+    assert run(COUNTS, {"primary": "lead", "state": "streaming", "steps": 0, "steps_now": 0} | changes) == told
 
 
 def test_only_calibrations_that_the_device_can_do_are_offered(run: Run) -> None:

@@ -10,7 +10,8 @@ import { Card } from "./card.js";
 import { CountersDialog } from "./counters_dialog.js";
 import { Devices } from "./devices.js";
 import { Feed } from "./feed.js";
-import { duration, localTime, whole, zone } from "./format.js";
+import { duration, localTime, zone } from "./format.js";
+import { counts, shownState, spokenCount } from "./primary.js";
 import { Trials } from "./trials.js";
 
 const ANNOUNCE_MS = 10_000;
@@ -100,7 +101,7 @@ function showDevices() {
   $("empty").hidden = !empty;
   $("devices").classList.toggle("several", entries.length > 1);
   trials.show(entries.map(({ device }) => device));
-  document.title = entries.length === 1 ? `${whole(entries[0].device.steps_now)} steps · steplink` : "steplink";
+  document.title = entries.length === 1 ? `${counts(entries[0].device).now} steps · steplink` : "steplink";
 }
 
 /** While there is no bracelet, say whether the server's Bluetooth is the reason. */
@@ -114,11 +115,13 @@ async function showTrouble() {
 function announce(nowMs) {
   for (const { device } of devices.all) {
     const before = spoken.states.get(device.id);
-    spoken.states.set(device.id, device.state);
-    if (before !== undefined && before !== device.state) $("announce").textContent = `${device.name}: ${device.state}`;
+    const state = shownState(device);
+    spoken.states.set(device.id, state);
+    if (before === undefined || before === state) continue;
+    $("announce").textContent = `${device.name}: ${state === "faulted" ? "not counting" : state}`;
   }
   if (nowMs - spoken.atMs < ANNOUNCE_MS) return;
-  const text = devices.all.map(({ device }) => `${device.name}: ${whole(device.steps_now)} steps`).join(", ");
+  const text = devices.all.map(({ device }) => `${device.name}: ${spokenCount(device)}`).join(", ");
   if (text !== spoken.text) $("announce").textContent = text;
   spoken.atMs = nowMs;
   spoken.text = text;

@@ -2,8 +2,8 @@
  * The form that begins a calibration: which one, at which pace, for how many steps or how long.
  */
 
-import { LIMITS, PACES, asked, method, range } from "./calibration_words.js";
-import { el, freshId, labelled, numberField, setText } from "./dom.js";
+import { LIMITS, PACES, asked, blamesAmount, method, range } from "./calibration_words.js";
+import { el, freshId, labelled, mark, numberField, setText } from "./dom.js";
 import { words } from "./looks.js";
 
 export class CalibrationForm {
@@ -23,7 +23,7 @@ export class CalibrationForm {
     this.#pace.value = "normal";
     this.#which = el("select", { onchange: () => this.#follow() });
     this.#limit = el("select", { onchange: () => this.#usual() });
-    this.#amount = numberField({ "aria-describedby": this.#range.id });
+    this.#amount = numberField({ "aria-describedby": this.#range.id, oninput: () => mark(this.#amount, false) });
     this.#paceRow = labelled("Pace", this.#pace);
     this.element = el("form", { className: "fields", noValidate: true }, this.#text,
       labelled("Calibration", this.#which), this.#paceRow,
@@ -48,6 +48,13 @@ export class CalibrationForm {
     this.#follow();
   }
 
+  /** Point at the field that a refusal names; null says that nothing was refused. What was typed stays. */
+  blame(sentence) {
+    const wrong = sentence !== null && blamesAmount(sentence);
+    mark(this.#amount, wrong);
+    if (wrong) this.#amount.focus();
+  }
+
   get #offer() {
     return this.#offers[Number(this.#which.value)];
   }
@@ -70,6 +77,7 @@ export class CalibrationForm {
 
   #usual() {
     this.#amount.value = String(LIMITS[this.#limit.value].usual);
+    mark(this.#amount, false);
     setText(this.#range, range(this.#offer.method, this.#limit.value));
   }
 }

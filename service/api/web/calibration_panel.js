@@ -132,8 +132,8 @@ export class CalibrationPanel {
     from.delete(number);
   }
 
-  #begin(body) {
-    return this.#change("POST", ["calibrations"], body);
+  async #begin(body) {
+    this.#form.blame(await this.#change("POST", ["calibrations"], body));
   }
 
   #finish(number) {
@@ -152,7 +152,7 @@ export class CalibrationPanel {
       return;
     }
     const name = capital(words(done[0].counter));
-    if (await this.#change("POST", ["calibrations", "apply"], { numbers })) {
+    if (await this.#change("POST", ["calibrations", "apply"], { numbers }) === null) {
       const leads = this.#device.primary === done[0].counter;
       const segment = leads ? " A new segment begins; the count goes on." : "";
       setText(this.#said, `${name} now uses what was learnt.${segment}`);
@@ -160,13 +160,14 @@ export class CalibrationPanel {
     }
   }
 
+  /** Ask for a change; resolves to the sentence of a refusal, null where there was none. */
   async #change(verb, parts, body) {
     this.#error.hidden = true;
     this.#said.hidden = true;
     const { error } = await request(of(this.#device, ...parts), { method: verb, body });
     if (error) this.#fail(error);
     this.#poll.now();
-    return error === null;
+    return error;
   }
 }
 

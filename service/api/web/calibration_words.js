@@ -58,6 +58,11 @@ export function asked(offer, { limit, amount, pace }) {
   return { counter: offer.counter, method: offer.method, ...(paced ? { pace } : {}), [by]: number };
 }
 
+/** Return whether a refusal names what was typed, the steps or the seconds: "steps = 3: …" or "body.steps: …". */
+export function blamesAmount(sentence) {
+  return /^(\w+\.)*(steps|seconds)\b/.test(sentence);
+}
+
 /** Return how far a recording is: `{share, text}`, the share from 0 to 1. */
 export function progress({ steps, seconds, steps_wanted: stepsWanted, seconds_wanted: secondsWanted }) {
   const [done, of] = stepsWanted == null ? [seconds, secondsWanted] : [steps, stepsWanted];

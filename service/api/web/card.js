@@ -9,12 +9,14 @@ import { UNKNOWN, duration, localTime, measured, percent, plural, whole } from "
 import { Lanes, glyph } from "./lanes.js";
 import { look } from "./looks.js";
 import { Plot } from "./plot.js";
+import { counts, faultNotice, primaryFault, shownState } from "./primary.js";
 
 /** State in words; the icon has the same name. */
 const STATES = {
   seen: "In range, not connected",
   connecting: "Connecting…",
   streaming: "Live",
+  faulted: "Live, not counting",
   lost: "Lost",
   disconnected: "Disconnected",
   stale: "Not up to date",
@@ -36,6 +38,7 @@ export class Card {
   #asked = null;
   #error = null;
   #before = null;
+  #name = "";
   #steps = null;
 
   /**
@@ -60,7 +63,7 @@ export class Card {
     this.#before = device.state;
     this.#device = device;
     this.#panel.show(device);
-    this.#state(stale ? "stale" : device.state);
+    this.#state(stale ? "stale" : shownState(device));
     this.#head(device, now);
     this.#numbers(device);
     this.#counters(device);
@@ -68,13 +71,28 @@ export class Card {
   }
 
   draw(nowMs, options) {
-    this.#plot.draw(nowMs, options);
-    this.#lanes.draw(this.#trace.edge(nowMs), nowMs, options);
+    const fault = this.#device && primaryFault(this.#device);
+    this.#plot.draw(nowMs, { ...options, idle: Boolean(fault) });
+    const edge = this.#trace.edge(nowMs);
+    this.#lanes.draw(edge, nowMs, options);
+    this.#key(fault ? {} : this.#trace.carried(edge));
   }
 
   restyle() {
     this.#plot.restyle();
     this.#lanes.restyle();
+  }
+
+  /** Explain what the plot shows, and nothing that it cannot show. */
+  #key({ signal = false, upper = false, lower = false }) {
+    for (const [name, shown] of Object.entries({ signal, upper, lower, step: signal, gap: signal })) {
+      this.#fields[`key-${name}`].hidden = !shown;
+    }
+    const bands = upper || lower ? "its thresholds, " : "";
+    this.#label(this.#fields.canvas, signal
+      ? `The last ten seconds of ${this.#name}: ${look(this.#device.primary).signal}, ${bands}`
+        + "and a mark at each counted step."
+      : `The last ten seconds of ${this.#name}: no signal.`);
   }
 
   /** Take the card off the page. */
@@ -99,13 +117,12 @@ export class Card {
   #head(device, now) {
     const { manufacturer, model, firmware, id } = device;
     const name = device.name || model || id;
+    this.#name = name;
     this.#text("name", name);
     const made = [manufacturer, model].filter(Boolean).join(" ");
     this.#text("model", [made, firmware && `firmware ${firmware}`, id].filter(Boolean).join(" · "));
     this.#text("notice", this.#error ?? notice(device, now));
     this.#fields.notice.hidden = !this.#fields.notice.textContent;
-    this.#fields.canvas.setAttribute("aria-label", `The last ten seconds of ${name}: filtered acceleration in g, `
-      + "both thresholds, and a mark at each counted step.");
     this.#battery(device.battery_percent);
     this.#fields.lanes.setAttribute("aria-label", `Counters on ${name}`);
     this.#fields.choose.setAttribute("aria-label", `Counters of ${name}`);
@@ -139,15 +156,16 @@ export class Card {
     this.#asked = null;
   }
 
-  #numbers({ state, steps, steps_now, cadence_spm }) {
-    const pending = Math.max(0, steps_now - steps);
-    this.#text("steps-now", whole(steps_now));
-    this.element.style.setProperty("--chars", Math.max(2, whole(steps_now).length));
-    this.#text("steps", whole(steps));
+  #numbers(device) {
+    const { steps_now, cadence_spm } = device;
+    const { now, confirmed, pending } = counts(device);
+    this.#text("steps-now", now);
+    this.element.style.setProperty("--chars", Math.max(2, now.length));
+    this.#text("steps", confirmed);
     this.#text("pending", `+${whole(pending)}`);
     this.#fields["pending-chip"].classList.toggle("none", pending === 0);
     this.element.classList.toggle("provisional", pending > 0);
-    this.#text("cadence", state === "streaming" ? whole(cadence_spm) : UNKNOWN);
+    this.#text("cadence", shownState(device) === "streaming" ? whole(cadence_spm) : UNKNOWN);
     if (this.#steps !== null && steps_now > this.#steps) this.#beat();
     this.#steps = steps_now;
   }
@@ -161,8 +179,9 @@ export class Card {
     this.#text("packets", whole(device.packets));
     this.#text("packets-more", `${whole(device.packets_bad)} bad, ${whole(device.packets_duplicate)} repeated`);
     this.#text("lost", percent(device.samples_lost, device.samples));
-    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`
-      + (device.samples_saturated ? `, ${whole(device.samples_saturated)} at their limit` : ""));
+    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`);
+    this.#text("limit", whole(device.samples_saturated));
+    this.#fields["limit-row"].hidden = !device.samples_saturated;
     this.#text("gaps", whole(device.gaps));
     this.#text("gaps-more", plural(device.reboots, "restart"));
     this.#text("rate", measured(device.measured_rate_hz ?? device.rate_hz, 1, "Hz"));
@@ -176,6 +195,8 @@ export class Card {
 
   #counters(device) {
     const { primary } = device;
+    this.#text("why", primaryFault(device) ?? "");
+    this.#fields.why.hidden = !this.#fields.why.textContent;
     this.#lanes.show(device);
     this.element.style.setProperty("--lanes", this.#lanes.count);
     this.#text("axis", look(primary).signal);
@@ -186,6 +207,10 @@ export class Card {
     this.#fields["key-step"].replaceChildren(likely, "likely", glyph(primary), "counted step");
   }
 
+  #label(node, text) {
+    if (node.getAttribute("aria-label") !== text) node.setAttribute("aria-label", text);
+  }
+
   #text(field, text) {
     const node = this.#fields[field];
     if (node.textContent !== text) node.textContent = text;
@@ -193,7 +218,8 @@ export class Card {
 }
 
 /** Return the sentence under a card's head, or nothing where all is well. */
-export function notice({ state, reason, since }, now) {
+export function notice(device, now) {
+  const { state, reason, since } = device;
   const why = reason ? ` (${reason})` : "";
   const at = localTime(since, now);
   if (state === "lost") {
@@ -201,7 +227,8 @@ export function notice({ state, reason, since }, now) {
       + "It comes back by itself once it is in range.";
   }
   if (state === "disconnected") return `Disconnected since ${at}${why}.`;
-  return reason ? `${STATES[state] ?? state}: ${reason}` : "";
+  const said = reason ? `${STATES[state] ?? state}: ${reason}` : "";
+  return [faultNotice(device), said].filter(Boolean).join(" ");
 }
 
 function strength(dbm) {

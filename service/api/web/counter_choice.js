@@ -2,9 +2,9 @@
  * One counter in the dialog that chooses them: whether it runs, whether it leads, its preset and its parameters.
  */
 
-import { el, freshId, setText } from "./dom.js";
+import { el, freshId, mark, setText } from "./dom.js";
 import { glyph } from "./lanes.js";
-import { typed, valueOf } from "./lineup.js";
+import { named, typed, valueOf } from "./lineup.js";
 import { words } from "./looks.js";
 
 /** The sensor that every wearable has: it is not worth a word. */
@@ -57,10 +57,11 @@ export class CounterChoice {
     for (const field of this.#fields) field.show(entry);
   }
 
-  /** Point at the parameter that a refusal names, as "bout = 99: …"; return whether it is this counter's. */
+  /** Point at the parameter that a refusal names, as "autocorrelation.bout = 99: …"; return whether it is this counter's. */
   blame(sentence) {
-    const guilty = this.#fields.find((field) => this.#entry.on && field.named(sentence, this.#entry));
-    for (const field of this.#fields) field.fault(field === guilty ? sentence : null);
+    const { name } = this.#counter;
+    const guilty = this.#fields.find((field) => this.#entry.on && named(sentence, name, field.name, this.#entry));
+    for (const field of this.#fields) field.mark(field === guilty);
     if (!guilty) return false;
     this.#more.open = true;
     guilty.focus();
@@ -109,13 +110,12 @@ class Field {
     if (this.#input.value !== this.#text) this.#input.value = this.#text;
   }
 
-  named(sentence, { params }) {
-    return sentence.startsWith(`${this.#parameter.name} = `) && this.#parameter.name in params;
+  get name() {
+    return this.#parameter.name;
   }
 
-  fault(sentence) {
-    if (sentence) this.#input.setAttribute("aria-invalid", "true");
-    else this.#input.removeAttribute("aria-invalid");
+  mark(wrong) {
+    mark(this.#input, wrong);
   }
 
   focus() {

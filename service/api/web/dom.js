@@ -41,6 +41,12 @@ export function numberField(props = {}) {
   return el("input", { type: "text", inputMode: "numeric", autocomplete: "off", className: "short", ...props });
 }
 
+/** Mark a field as the one that was refused, or as right again. */
+export function mark(field, wrong) {
+  if (wrong) field.setAttribute("aria-invalid", "true");
+  else field.removeAttribute("aria-invalid");
+}
+
 /** Return a button that does `onclick`. */
 export function button(text, onclick, props = {}) {
   return el("button", { type: "button", onclick, ...props }, text);

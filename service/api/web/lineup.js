@@ -57,6 +57,15 @@ export function typed(parameter, { preset, params }, text) {
   return value === "" || value === parameter.presets[preset] ? rest : { ...rest, [parameter.name]: value };
 }
 
+/**
+ * Return whether a refusal names this parameter: as "autocorrelation.bout = 99: …", or as "bout = 99: …", which is that
+ * of a counter whose `params` have it.
+ */
+export function named(sentence, counter, parameter, { params }) {
+  if (sentence.startsWith(`${counter}.${parameter} = `)) return true;
+  return sentence.startsWith(`${parameter} = `) && Object.hasOwn(params, parameter);
+}
+
 /** Return the lineup to ask the server for, the primary first. */
 export function wanted({ primary, entries }) {
   const on = entries.filter((entry) => entry.on);

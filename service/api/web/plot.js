@@ -55,16 +55,20 @@ export class Plot {
     this.#colours = theme(this.#canvas, ["signal", "upper", "lower", "grid", "ink-soft", "card", "gap", ...COLOURS]);
   }
 
-  /** Draw the picture of `nowMs`; without `motion` marks appear without an animation. */
-  draw(nowMs, { motion = true } = {}) {
+  /**
+   * Draw the picture of `nowMs`; without `motion` marks appear without an animation. `idle` says that no signal is to
+   * be expected: the time axis stands alone.
+   */
+  draw(nowMs, { motion = true, idle = false } = {}) {
     const { width, height } = fit(this.#canvas, this.#context);
     if (!width || !height) return;
-    const edge = this.#trace.edge(nowMs);
+    const edge = idle ? null : this.#trace.edge(nowMs);
     const frame = this.#frame(edge, width, height, nowMs);
     this.#context.clearRect(0, 0, width, height);
-    this.#axes(frame);
+    if (!idle) this.#scale(frame);
+    this.#times(frame);
     if (edge === null) {
-      this.#waiting(frame);
+      if (!idle) this.#waiting(frame);
       return;
     }
     this.#context.save();
@@ -111,7 +115,7 @@ export class Plot {
     return this.#range;
   }
 
-  #axes({ right, bottom, low, high, y }) {
+  #scale({ right, low, high, y }) {
     const c = this.#context;
     c.font = this.#colours.font;
     c.fillStyle = this.#colours["ink-soft"];
@@ -126,6 +130,14 @@ export class Plot {
       this.#line(PAD.left, at, right, at);
       c.fillText(g.toFixed(digits), PAD.left - 8, at);
     }
+  }
+
+  #times({ right, bottom }) {
+    const c = this.#context;
+    c.font = this.#colours.font;
+    c.fillStyle = this.#colours["ink-soft"];
+    c.strokeStyle = this.#colours.grid;
+    c.lineWidth = 1;
     c.textBaseline = "alphabetic";
     for (let s = WINDOW_S; s >= 0; s -= 2) {
       const at = right - (s / WINDOW_S) * (right - PAD.left);
@@ -228,13 +240,14 @@ export class Plot {
     this.#line(left, PAD.top, left, bottom);
   }
 
-  /** Mark the primary's steps on the signal: hollow while they are likely, solid once they count. */
+  /** Mark the primary's steps where there is a signal to mark: hollow while they are likely, solid once they count. */
   #marks({ fromS, bottom, x, y }, nowMs, motion) {
     const onSignal = ({ atS, peak }) => {
       const g = peak ?? this.#trace.valueAt(atS);
       return g === null ? PAD.top + 6 : y(g);
     };
-    const shown = ({ atS }) => atS >= fromS - 0.2;
+    const begun = Math.max(fromS - 0.2, this.#trace.beginS);
+    const shown = ({ atS }) => atS >= begun;
     for (const step of this.#trace.likely.filter(shown)) {
       const mark = this.#shape(step.counter, x(step.atS), onSignal(step), 4.5);
       paintLikely(this.#context, mark.shape, { ...mark.paint, alpha: presence(step, nowMs, motion) });

@@ -110,6 +110,12 @@ export class Trace {
     return this.#begin === null ? null : this.#begin / this.rateHz;
   }
 
+  /** Return what the last KEPT_S up to the device time `edge` hold: `{signal, upper, lower}`, each true or false. */
+  carried(edge) {
+    const holds = (name) => this.bands.some((band) => band[name] != null);
+    return { signal: edge !== null, upper: holds("upper"), lower: holds("lower") };
+  }
+
   /** Return the signal at grid index `k` in g; NaN where there is none. */
   at(k) {
     return this.#end === null || k >= this.#end || k < this.#end - CAPACITY ? NaN : this.#values[k & (CAPACITY - 1)];

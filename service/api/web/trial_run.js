@@ -2,9 +2,9 @@
  * A trial that is walked: both counts live beside each other, and the field for the true one.
  */
 
-import { button, el, labelled, numberField, setText } from "./dom.js";
+import { button, el, labelled, mark, numberField, setText } from "./dom.js";
 import { whole } from "./format.js";
-import { standing, trueSteps } from "./trial_words.js";
+import { REFUSED, standing, trueSteps } from "./trial_words.js";
 
 export class TrialRun {
   element;
@@ -14,15 +14,17 @@ export class TrialRun {
   #truth;
   #form;
 
-  /** `finish(steps)` gets the true steps, or null where they are not known yet. */
+  /** `finish(steps)` gets the true steps, or null where they are not known yet; resolves to `{status}`. */
   constructor({ finish, cancel }) {
-    this.#truth = numberField({ placeholder: "counted" });
+    this.#truth = numberField({ placeholder: "counted", oninput: () => mark(this.#truth, false) });
     this.#form = el("form", { className: "fields", noValidate: true },
       labelled("True steps (may come later)", this.#truth),
       el("button", { type: "submit", className: "primary" }, "Finish"), button("Cancel the trial", () => cancel()));
-    this.#form.addEventListener("submit", (event) => {
+    this.#form.addEventListener("submit", async (event) => {
       event.preventDefault();
-      finish(trueSteps(this.#truth.value));
+      const steps = trueSteps(this.#truth.value);
+      const { status } = await finish(steps);
+      mark(this.#truth, status === REFUSED && steps !== null);
     });
     this.element = el("section", { className: "run", "aria-label": "Running trial" },
       this.#title, this.#state, this.#sides, this.#form);

@@ -2,33 +2,35 @@
  * The table of finished trials, in the columns of Wang 2018's Table 4, with means, true steps to enter, and deleting.
  */
 
-import { button, el, numberField, setText } from "./dom.js";
+import { button, el, mark, numberField, setText } from "./dom.js";
 import { plural } from "./format.js";
-import { COLUMNS, cells, means, trueSteps } from "./trial_words.js";
+import { COLUMNS, REFUSED, cells, means, trueSteps } from "./trial_words.js";
 
 /** How long a first press of Delete waits for the second. */
 const SURE_MS = 4_000;
 
 export class TrialTable {
   element;
-  #body = el("tbody");
+  #table;
   #means = el("ul", { className: "plain means" });
   #tell;
   #shown = "";
+  /** What was typed as true steps and not taken, by trial: `{text, wrong}`. */
+  #typed = new Map();
 
-  /** `tell` has `truth(number, steps)` and `remove(number)`. */
+  /** `tell` has `truth(number, steps)`, which resolves to `{status, error}`, and `remove(number)`. */
   constructor(tell) {
     this.#tell = tell;
     const heads = COLUMNS.map(({ title, number }) => (
       el("th", { role: "columnheader", scope: "col", className: number ? "number" : "" }, title)));
     heads.push(el("th", { role: "columnheader", scope: "col" }, el("span", { className: "unseen" }, "Delete")));
     // Roles are said in full: on a narrow screen the style sheet lays rows out as blocks, which would lose them.
-    const table = el("table", { role: "table" },
-      el("caption", {}, "Finished trials"), el("thead", {}, el("tr", {}, ...heads)), this.#body);
+    this.#table = el("table", { role: "table" },
+      el("caption", {}, "Finished trials"), el("thead", {}, el("tr", {}, ...heads)));
     const csv = el("a", { href: "api/v1/trials/table.csv", download: "trials.csv" }, "Download as CSV");
     csv.className = "button";
     this.element = el("section", { className: "finished", hidden: true, "aria-label": "Finished trials" },
-      el("div", { className: "sideways", tabIndex: 0, role: "region", "aria-label": "Table of trials" }, table),
+      el("div", { className: "sideways", tabIndex: 0, role: "region", "aria-label": "Table of trials" }, this.#table),
       el("h3", {}, "Mean accuracy"), this.#means, csv);
   }
 
@@ -38,9 +40,10 @@ export class TrialTable {
     const shown = JSON.stringify([trials, trials.flatMap(({ rows }) => rows.map(({ device }) => name(device)))]);
     if (shown === this.#shown || this.#isEdited) return;
     this.#shown = shown;
-    const held = this.#body.contains(document.activeElement) && document.activeElement.getAttribute("aria-label");
-    this.#body.replaceChildren(...trials.flatMap((trial) => this.#rows(trial, name)));
-    if (held) this.#body.querySelector(`[aria-label="${CSS.escape(held)}"]`)?.focus();
+    const held = this.#table.contains(document.activeElement) && document.activeElement.getAttribute("aria-label");
+    for (const body of [...this.#table.tBodies]) body.remove();
+    this.#table.append(...trials.map((trial) => el("tbody", { role: "rowgroup" }, ...this.#rows(trial, name))));
+    if (held) this.#table.querySelector(`[aria-label="${CSS.escape(held)}"]`)?.focus();
     const mean = means(trials, name);
     this.#means.replaceChildren(...mean.map(({ title, text, rows: count }) => (
       el("li", {}, el("span", {}, title), el("b", {}, text), el("small", {}, plural(count, "row"))))));
@@ -49,15 +52,17 @@ export class TrialTable {
 
   get #isEdited() {
     const active = document.activeElement;
-    return this.#body.contains(active) && active.matches("input") && active.value !== active.defaultValue;
+    return this.#table.contains(active) && active.matches("input") && active.value !== active.defaultValue;
   }
 
+  /** The rows of one trial; on a narrow screen they stand side by side, a note under its own. */
   #rows(trial, name) {
     return cells(trial, name).flatMap((row, i) => {
       const own = COLUMNS.map((column) => this.#cell(trial, row, column, i === 0));
       const remove = el("td", { role: "cell", className: "last" }, i === 0 ? this.#remove(trial, row.item) : null);
-      const doubt = el("tr", { role: "row", className: "doubt" }, el("td", { role: "cell", colspan: "9" }, row.note));
-      const line = el("tr", { role: "row", className: i === 0 ? "first" : "" }, ...own, remove);
+      const side = i % 2 ? "right" : "left";
+      const doubt = el("tr", { role: "row", className: `doubt ${side}` }, el("td", { role: "cell", colspan: "9" }, row.note));
+      const line = el("tr", { role: "row", className: i === 0 ? `first ${side}` : side }, ...own, remove);
       return row.note ? [line, doubt] : [line];
     });
   }
@@ -65,7 +70,7 @@ export class TrialTable {
   /** The true steps belong to the trial: its first row has the field, the others repeat them. */
   #cell(trial, row, { key, title, number }, first) {
     const value = key === "truth" && first ? this.#truth(trial, row) : row[key];
-    return el("td", { role: "cell", className: number ? "number" : "", "data-title": title }, value);
+    return el("td", { role: "cell", className: number ? "number" : "", "data-title": title, "data-key": key }, value);
   }
 
   #truth(trial, { item }) {
@@ -74,14 +79,27 @@ export class TrialTable {
       defaultValue: before, placeholder: "?",
       "aria-label": `True steps of ${item}`,
       onchange: () => this.#enter(trial.number, field),
+      oninput: () => mark(field, false),
       onkeydown: (event) => event.key === "Enter" && field.blur(),
     });
+    const { text = before, wrong = false } = this.#typed.get(trial.number) ?? {};
+    field.value = text;
+    mark(field, wrong);
     return field;
   }
 
-  #enter(number, field) {
-    const steps = trueSteps(field.value);
-    if (steps !== null) this.#tell.truth(number, steps);
+  /** What the server does not take stays as it was typed, marked where it is wrong. */
+  async #enter(number, field) {
+    const text = field.value;
+    const steps = trueSteps(text);
+    this.#typed.delete(number);
+    if (steps === null) return;
+    this.#typed.set(number, { text, wrong: false });
+    const { status, error } = await this.#tell.truth(number, steps);
+    if (this.#typed.get(number)?.text !== text) return;
+    if (error === null) this.#typed.delete(number);
+    else this.#typed.set(number, { text, wrong: status === REFUSED });
+    mark(field, status === REFUSED);
   }
 
   /** Deleting takes two presses; the button says so in between. */

@@ -17,6 +17,9 @@ export const COLUMNS = [
   { key: "accuracy", title: "Accuracy", number: true },
 ];
 
+/** The status of an answer that refuses what was typed. */
+export const REFUSED = 422;
+
 /** Return a count with its sign; a dash where it is not known. */
 export function signed(value) {
   if (value == null) return UNKNOWN;

@@ -103,10 +103,12 @@ export class Trials {
     this.#cut = false;
   }
 
+  /** Ask for a change; resolves to `{status, error}` as `request` does. */
   async #change(method, path, body) {
     this.#error.hidden = true;
-    const { error } = await request(path, { method, body });
+    const { status, error } = await request(path, { method, body });
     if (error) this.#fail(error);
     this.#poll.now();
+    return { status, error };
   }
 }
