@@ -204,12 +204,15 @@ class StepCounted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tentative:
-    """Neither kept nor numbered: the primary's step at `at_s` is likely, or is `retracted`; a StepCounted confirms it.
+    """Neither kept nor numbered: `counter`, the primary, calls its step at `at_s` likely, or it is `retracted`.
+
+    The StepCounted of that counter, boot and time confirms it.
 
     `passes` tells whether it passes what was in force when it was told: the sure ones. `interval_s` is the time since
     the confirmed step or the sure one before, None after a pause. Time and heading as in StepCounted.
     """
 
+    counter: str
     boot: int
     at_s: float
     strength: float

@@ -19,7 +19,7 @@ from service.counters import registry
 from service.errors import UnknownDeviceError
 from service.pipeline.hub import SlowSubscriberError, Subscription
 from service.pipeline.supervisor import Supervisor
-from service.samples import StepCounted
+from service.samples import StepCounted, Tentative
 
 CLOSE_UNKNOWN = 4404
 CLOSE_SLOW = 4408
@@ -32,7 +32,7 @@ async def serve_feed(
 ) -> None:
     """Serve one client until it goes or falls behind.
 
-    `wanted` are device ids or addresses, `counters` names whose steps are told; empty means all.
+    `wanted` are device ids or addresses, `counters` names whose steps, likely ones too, are told; empty means all.
     """
     await socket.accept()
     try:
@@ -69,7 +69,8 @@ async def _send(
         try:
             while True:
                 for notice in await subscription.receive():
-                    if counters and isinstance(notice.event, StepCounted) and notice.event.counter not in counters:
+                    told = notice.event
+                    if counters and isinstance(told, StepCounted | Tentative) and told.counter not in counters:
                         continue
                     await _send_text(socket, event_view(notice, supervisor).model_dump_json())
         except SlowSubscriberError:

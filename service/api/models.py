@@ -108,11 +108,12 @@ class StepEvent(_Durable):
 class TentativeEvent(_Event):
     """A step of the primary counter that is likely, some 0.2 s after it happened; or that it has taken back.
 
-    Every step is told so before it is confirmed by the `step` event with the same `device_s` and `boot`; what is not
-    confirmed is retracted. It has no ordinal and no log keeps it. See the guide, `navigation`.
+    Every step is told so before it is confirmed by the `step` event with the same `counter`, `device_s` and `boot`;
+    what is not confirmed is retracted. It has no ordinal and no log keeps it. See the guide, `navigation`.
     """
 
     type: Literal["tentative"] = "tentative"
+    counter: str = Field(description="The primary, whose `step` confirms it", examples=["double_threshold"])
     status: Literal["likely", "retracted"]
     passes: bool = Field(description="Passes the thresholds in force when it was told: nine in ten of these are steps")
     device_s: float = Field(description="Device time of the step", examples=[21.34])

@@ -160,6 +160,7 @@ def _tentative_view(notice: Notice, event: Tentative) -> models.TentativeEvent:
     return models.TentativeEvent(
         device=notice.device,
         at=utc(notice.at_ns),
+        counter=event.counter,
         status="retracted" if event.retracted else "likely",
         passes=event.passes,
         device_s=event.at_s,

@@ -25,8 +25,8 @@ class TentativeSteps:
         """What was told and neither confirmed nor retracted, by device time."""
         self._confirmed_s: float | None = None
 
-    def follow(self, boot: int, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Tentative]:
-        """Return the events that lead from what was told to `likely` and to steps `confirmed` meanwhile."""
+    def follow(self, counter: str, boot: int, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Tentative]:
+        """Return the events that lead from what was told to `counter`'s `likely` and to its steps `confirmed` now."""
         if not likely and not self._open and not confirmed:
             return []
         certain = {step.at_s for step in confirmed}
@@ -40,26 +40,26 @@ class TentativeSteps:
         ]
         for step in confirmed:
             if step.at_s not in told:
-                events.append(self._tell(boot, step.at_s, step.strength, passes=True))
+                events.append(self._tell(counter, boot, step.at_s, step.strength, passes=True))
             self._confirmed_s = step.at_s
         for at_s in sorted(now.keys() - told.keys()):
             strength, passes = now[at_s]
-            self._open[at_s] = self._tell(boot, at_s, strength, passes=passes)
+            self._open[at_s] = self._tell(counter, boot, at_s, strength, passes=passes)
             events.append(self._open[at_s])
         return events
 
     def snapshot(self) -> list[object]:
         """Return the state as plain data."""
-        told = [[event.boot, at_s, event.strength, event.passes] for at_s, event in self._open.items()]
+        told = [[event.counter, event.boot, at_s, event.strength, event.passes] for at_s, event in self._open.items()]
         return [told, self._confirmed_s]
 
     def restore(self, state: Sequence[Any]) -> None:
         """Take over a snapshot's state."""
         told, self._confirmed_s = state
-        self._open = {entry[1]: _event(*entry) for entry in told}
+        self._open = {entry[2]: _event(*entry) for entry in told}
 
-    def _tell(self, boot: int, at_s: float, strength: float, *, passes: bool) -> Tentative:
-        return replace(_event(boot, at_s, strength, passes), interval_s=self._interval_s(at_s))
+    def _tell(self, counter: str, boot: int, at_s: float, strength: float, *, passes: bool) -> Tentative:
+        return replace(_event(counter, boot, at_s, strength, passes), interval_s=self._interval_s(at_s))
 
     def _interval_s(self, at_s: float) -> float | None:
         sure = [event.at_s for event in self._open.values() if event.passes and event.at_s < at_s]
@@ -69,5 +69,7 @@ class TentativeSteps:
         return since_s if since_s <= _LONGEST_S else None
 
 
-def _event(boot: int, at_s: float, strength: float, passes: bool) -> Tentative:
-    return Tentative(boot=boot, at_s=at_s, strength=strength, interval_s=None, passes=passes, retracted=False)
+def _event(counter: str, boot: int, at_s: float, strength: float, passes: bool) -> Tentative:
+    return Tentative(
+        counter=counter, boot=boot, at_s=at_s, strength=strength, interval_s=None, passes=passes, retracted=False
+    )

@@ -343,7 +343,7 @@ class Tracker:
 
     def _follow(self, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Event]:
         """Tell what the primary calls likely, and take back what it does no more."""
-        told = self._tentative.follow(self._boot or 0, likely, confirmed)
+        told = self._tentative.follow(self.primary, self._boot or 0, likely, confirmed)
         if not told:
             return []
         uncertainty_s = self._uncertainty_s(self.primary)

@@ -87,6 +87,17 @@ async def test_the_feed_tells_steps_of_the_counters_asked_for(walk):
         while (message := json.loads(await feed.recv()))["type"] != "step":
             pass
         assert message["counter"] == "double_threshold"
+    beside = {"counters": [{"name": "double_threshold"}, {"name": "autocorrelation"}]}
+    assert (await walk.http.put("api/v1/devices/sim-1/counters", json=beside)).status_code == 200
+    async with walk.live("?counters=autocorrelation") as feed, asyncio.timeout(10):
+        heard = []
+        while sum(message["type"] == "step" for message in heard) < 5:
+            heard.append(json.loads(await feed.recv()))
+    assert "tentative" not in {message["type"] for message in heard}, "likely steps are the primary's"
+    async with walk.live("?counters=double_threshold") as feed, asyncio.timeout(10):
+        while (message := json.loads(await feed.recv()))["type"] != "tentative":
+            pass
+        assert message["counter"] == "double_threshold"
     with pytest.raises(websockets.ConnectionClosed) as closed:
         async with walk.live("?counters=abacus") as feed:
             await feed.recv()

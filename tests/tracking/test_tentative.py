@@ -29,31 +29,31 @@ def told(events):
 
 def test_told_once_then_confirmed():
     steps = TentativeSteps()
-    assert told(steps.follow(1, [(0.5, 0.3, True)], [])) == [(0.5, False)]
-    assert steps.follow(1, [(0.5, 0.3, True)], []) == []
-    assert steps.follow(1, [], [step(0.5)]) == []
+    assert told(steps.follow("counter", 1, [(0.5, 0.3, True)], [])) == [(0.5, False)]
+    assert steps.follow("counter", 1, [(0.5, 0.3, True)], []) == []
+    assert steps.follow("counter", 1, [], [step(0.5)]) == []
 
 
 def test_what_is_named_no_more_is_taken_back():
     steps = TentativeSteps()
-    steps.follow(1, [(0.5, 0.3, True), (0.9, 0.2, False)], [])
-    (back,) = steps.follow(1, [(0.9, 0.2, False)], [])
+    steps.follow("counter", 1, [(0.5, 0.3, True), (0.9, 0.2, False)], [])
+    (back,) = steps.follow("counter", 1, [(0.9, 0.2, False)], [])
     assert (back.at_s, back.strength, back.passes, back.retracted) == (0.5, 0.3, True, True)
-    assert steps.follow(1, [(0.9, 0.2, False)], []) == []
+    assert steps.follow("counter", 1, [(0.9, 0.2, False)], []) == []
 
 
 def test_a_step_confirmed_at_first_sight_is_told_just_before():
-    (event,) = TentativeSteps().follow(1, [], [step(0.5)])
+    (event,) = TentativeSteps().follow("counter", 1, [], [step(0.5)])
     assert (event.at_s, event.passes, event.retracted) == (0.5, True, False)
 
 
 def test_the_interval_is_from_the_last_sure_step():
     steps = TentativeSteps()
-    steps.follow(1, [], [step(0.5)])
-    events = steps.follow(1, [(0.8, 0.1, False), (1.0, 0.3, True), (1.2, 0.1, False), (1.6, 0.3, True)], [])
+    steps.follow("counter", 1, [], [step(0.5)])
+    events = steps.follow("counter", 1, [(0.8, 0.1, False), (1.0, 0.3, True), (1.2, 0.1, False), (1.6, 0.3, True)], [])
     assert [event.interval_s for event in events] == pytest.approx([0.3, 0.5, 0.2, 0.6])
     (late,) = steps.follow(
-        1, [(0.8, 0.1, False), (1.0, 0.3, True), (1.2, 0.1, False), (1.6, 0.3, True), (3.7, 1, True)], []
+        "counter", 1, [(0.8, 0.1, False), (1.0, 0.3, True), (1.2, 0.1, False), (1.6, 0.3, True), (3.7, 1, True)], []
     )
     assert late.interval_s is None
 
@@ -62,10 +62,10 @@ def test_the_interval_is_from_the_last_sure_step():
 def test_resumes_from_a_snapshot(cut):
     turns = [([(0.5, 0.3, True)], []), ([(0.5, 0.3, True), (1.0, 0.2, False)], []), ([], [step(0.5)])]
     whole, first, second = TentativeSteps(), TentativeSteps(), TentativeSteps()
-    expected = [whole.follow(1, *turn) for turn in turns]
-    before = [first.follow(1, *turn) for turn in turns[:cut]]
+    expected = [whole.follow("counter", 1, *turn) for turn in turns]
+    before = [first.follow("counter", 1, *turn) for turn in turns[:cut]]
     second.restore(json.loads(json.dumps(first.snapshot())))
-    assert before + [second.follow(1, *turn) for turn in turns[cut:]] == expected
+    assert before + [second.follow("counter", 1, *turn) for turn in turns[cut:]] == expected
 
 
 def walked(samples_a_packet, *, seconds=20):
