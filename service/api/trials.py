@@ -98,7 +98,7 @@ def _view(trial: Trial) -> TrialModel:
         mean=TrialMean(
             steps=mean([count.steps for count in counts]) or 0.0,
             error=mean(errors),
-            accuracy_percent=mean(accuracies),
+            accuracy_percent=_percent(mean(accuracies)),
         ),
     )
 
@@ -112,7 +112,12 @@ def _row(trial: Trial, count: Count) -> TrialRow:
             "steps": count.steps,
             "steps_now": count.steps_now,
             "error": trial.error(count),
-            "accuracy_percent": trial.accuracy_percent(count),
+            "accuracy_percent": _percent(trial.accuracy_percent(count)),
             "note": count.note(time.time_ns()),
         }
     )
+
+
+def _percent(accuracy: float | None) -> float | None:
+    """Return an accuracy to the hundredth that the paper prints, and two digits more."""
+    return None if accuracy is None else round(accuracy, 4)

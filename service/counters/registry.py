@@ -21,7 +21,7 @@ from service.counters import (
 )
 from service.counters.contract import StepCounter, lacking, with_overrides
 from service.counters.learning import MIDDLE, SLOWEST_WALK, WALK, Method
-from service.errors import CounterError
+from service.errors import CounterError, ParameterError
 from service.samples import Sensor
 
 DEFAULT: Final = "double_threshold"
@@ -127,7 +127,10 @@ def parameters(name: str, preset: str = "tuned", overrides: Mapping[str, object]
     presets = kind(name).presets
     if preset not in presets:
         raise CounterError(f"{name} has no preset {preset!r}; there are {', '.join(presets)}")
-    return with_overrides(presets[preset], overrides or {})
+    try:
+        return with_overrides(presets[preset], overrides or {})
+    except ParameterError as error:  # several counters have a parameter of that name
+        raise ParameterError(f"{name}.{error.name}", error.value, error.why) from None
 
 
 def require_sensors(name: str, sensors: Collection[Sensor] | None) -> None:

@@ -72,6 +72,8 @@ def lineup(primary: str, *, beside: Iterable[str] = (), preset: str = "tuned", p
     for text in params:
         path, equals, value = text.partition("=")
         name, dot, key = path.partition(".")
+        if equals and dot and key and name in registry.COUNTERS and name not in overrides:
+            raise ParameterError("param", text, f"{name} does not run: add --beside {name}")
         if not (equals and dot and key) or name not in overrides:
             raise ParameterError("param", text, f"NAME.KEY=VALUE with NAME one of {', '.join(names)}")
         overrides[name][key] = value

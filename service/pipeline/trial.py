@@ -186,7 +186,7 @@ class Count:
 
     def _settle_unheard(self, why: str) -> None:
         undecided = max(0, self._now - self.steps)
-        self._remarks.append(f"{why}; likely steps left out: {undecided}")
+        self._remarks.append(f"{why}; likely steps left out: {undecided}" if undecided else why)
         self.settled = True
 
 
