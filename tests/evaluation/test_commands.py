@@ -49,7 +49,7 @@ def test_a_folder_is_evaluated(folder, tmp_path, bare):
     assert rows["walks/plain.npz"]["steps"] == rows["walks/plain.npz"]["tp"] == 40
     assert rows["walks/counted.npz"]["dataset"] == "walks"
     assert "nan" in rows["rests/nan.npz"]["error"]
-    assert "not counted: 1 rows of 1 recordings" in answer.stdout
+    assert "not counted: 1 of 4 recordings\n" in answer.stdout
     assert "accuracy %" in answer.stdout
 
 
