@@ -36,7 +36,9 @@ first three displacements pass again, else one long stride would reject all that
 before it passes. Periodic: the main axis correlates with itself a step before, or with its mirror image. (1) and (2)
 disagree in the sign of gravity and are not used; (15) is why a swing shows in the field, and no rule. Orientation is a
 short filter of ours (`service.signals.orientation`), not the document's reference 47. After a gap only the filter in
-force and a certain bout with its displacements last; the bout goes on if its steps lie less than 3 s apart.
+force and a certain bout with its displacements last; the bout goes on if its steps lie less than 3 s apart. Of (9) only
+the level is kept, not when the norm crosses it, a step's start and end: a count takes one instant a step, its peak. The
+to-do's live rate estimate is the timebase's (`service.signals.timebase`).
 
 `matching = turns`, ours: an arm or a thigh turns back at about heel strike, so the extrema of its rate lie half a step
 from the norm's peaks, outside match_share, and `near` counts nothing of an even swing. But whatever the phase, the rate

@@ -43,7 +43,7 @@ async def evaluate(
     async def rows(file: Found, future: Future[list[Row]]) -> list[Row]:
         nonlocal done
         try:
-            made = await asyncio.wrap_future(future)
+            made = await _result(future)
         except BrokenExecutor:
             made = failed_rows(file, chosen, "the process that counted it ended: is there memory enough for --jobs?")
         done += 1
@@ -56,12 +56,24 @@ async def evaluate(
         by_file = await asyncio.gather(*(rows(file, future) for file, future in zip(found, futures, strict=True)))
         pool.shutdown()  # waited for: a pool that is still ending when Python ends may fail there
         return [row for made in by_file for row in made]
-    except asyncio.CancelledError:
+    except (asyncio.CancelledError, KeyboardInterrupt):
         for process in multiprocessing.active_children():
             process.terminate()
+        pool.shutdown(cancel_futures=True)  # waited for: what it says of the ended processes goes to a loop that runs
         raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+async def _result(future: Future[list[Row]]) -> list[Row]:
+    """Return what the pool makes; when cancelled, leave the future to the pool.
+
+    Its thread tells every future that its process ended, and fails with a traceback where one is cancelled by then.
+    """
+    made = asyncio.wrap_future(future)
+    made.add_done_callback(lambda each: each.cancelled() or each.exception())  # heard, also where nobody waits any more
+    await asyncio.wait([made])
+    return made.result()
 
 
 @contextlib.contextmanager

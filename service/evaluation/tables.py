@@ -36,7 +36,7 @@ def report(rows: Sequence[Row]) -> str:
     if counted:
         parts = [_asked(rows), *(table(counted, name, key) for name, key in _groupings(counted)), LEGEND]
     parts += _notes(counted)
-    parts += _errors([row for row in rows if row.error is not None])
+    parts += _errors(rows)
     return "\n\n".join(parts)
 
 
@@ -127,21 +127,38 @@ def _notes(rows: Iterable[Row]) -> list[str]:
     untaught = sorted({row.path for row in rows if row.uncalibrated})
     if untaught:
         notes.append(f"not calibrated (no walk in the middle of it): {_some(untaught)}")
+    learners = {row.counter for row in rows if row.calibration or row.uncalibrated}
+    others = dict.fromkeys(row.counter for row in rows if row.counter not in learners)
+    if learners and others:
+        notes.append(f"learnt nothing (no method to learn so, counted as they are): {', '.join(others)}")
     if unknown and len(listed) > EACH_RECORDING_UP_TO:
-        notes.append(f"the true number is unknown for {len(unknown)} recordings; --json FILE has the count of each")
+        notes.append(f"the true number is unknown for {_recordings(len(unknown))}; --json FILE has the count of each")
     return notes
 
 
 def _errors(rows: Sequence[Row]) -> list[str]:
     """Say what was not counted, equal reasons together."""
-    if not rows:
+    failed = [row for row in rows if row.error is not None]
+    if not failed:
         return []
-    files = {row.path for row in rows}
-    reasons = Counter(row.error or "" for row in rows)
+    reasons = Counter(row.error or "" for row in failed)
     shown = [f"  {times} × {why}" if times > 1 else f"  {why}" for why, times in reasons.most_common(ERRORS_SHOWN)]
     if len(reasons) > ERRORS_SHOWN:
         shown.append(f"  … {len(reasons) - ERRORS_SHOWN} more reasons")
-    return [f"not counted: {len(rows)} rows of {len(files)} recordings\n" + "\n".join(shown)]
+    return ["\n".join([f"not counted: {_how_many(rows, failed)}", *shown])]
+
+
+def _how_many(rows: Sequence[Row], failed: Sequence[Row]) -> str:
+    """Say how much failed: of one counter recordings, of several rows too, as most recordings fail for some only."""
+    if len({row.counter for row in rows}) == 1:
+        return f"{len(failed)} of {_recordings(len(rows))}"
+    paths, counted = {row.path for row in failed}, {row.path for row in rows if row.error is None}
+    of = f"{len(failed)} of {len(rows)} rows (recording × counter)"
+    return f"{of}: {_recordings(len(paths - counted))} by no counter, {len(paths & counted)} by some only"
+
+
+def _recordings(number: int) -> str:
+    return f"{number} recording{'' if number == 1 else 's'}"
 
 
 def _some(paths: Sequence[str]) -> str:

@@ -174,6 +174,8 @@ def _possible(path: Path) -> list[Format]:
 def _recognised(path: Path) -> Format:
     possible = _possible(path)
     if not possible:
+        if not path.exists():
+            raise RecordingError(str(path), "no such file")
         known_ones = ", ".join(sorted(suffixes()))
         raise RecordingError(str(path), f"unknown ending {path.suffix!r}; known are {known_ones}")
     head = _head(path)

@@ -89,7 +89,9 @@ class Recording:
             if values.shape != (len(self.t_s), 3):
                 raise self._fail(f"{name} has shape {values.shape}; with {len(self.t_s)} times it must be (n, 3)")
         if len(self) < MIN_SAMPLES:
-            raise self._fail(f"{len(self)} samples; at least {MIN_SAMPLES} are needed: is the file cut short?")
+            raise self._fail(
+                f"{len(self)} sample{'s' * (len(self) != 1)}; at least {MIN_SAMPLES} are needed: is the file cut short?"
+            )
 
     def _check_values(self) -> None:
         if not np.isfinite(self.t_s).all():

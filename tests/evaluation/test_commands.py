@@ -49,7 +49,7 @@ def test_a_folder_is_evaluated(folder, tmp_path, bare):
     assert rows["walks/plain.npz"]["steps"] == rows["walks/plain.npz"]["tp"] == 40
     assert rows["walks/counted.npz"]["dataset"] == "walks"
     assert "nan" in rows["rests/nan.npz"]["error"]
-    assert "not counted: 1 rows of 1 recordings" in answer.stdout
+    assert "not counted: 1 of 4 recordings\n" in answer.stdout
     assert "accuracy %" in answer.stdout
 
 
@@ -125,6 +125,22 @@ def test_ctrl_c_ends_all_processes_at_once(tmp_path, after_s):
     assert time.monotonic() - began < ENDS_WITHIN_S
     assert process.returncode == 130
     assert out == "steplink: stopped before it was done\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a terminal's Ctrl-C goes to a process group")
+def test_ctrl_c_is_quiet_whenever_it_comes(tmp_path):
+    for k in range(40):
+        save(walk(60, 100), tmp_path / "many" / f"{k}.npz")
+    words = command("evaluate", tmp_path, "--counter", "all", "--jobs", 2)
+    for after_s in np.linspace(0.9, 2.1, 8):
+        with subprocess.Popen(
+            words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+        ) as process:
+            time.sleep(after_s)
+            os.killpg(process.pid, signal.SIGINT)
+            out, _ = process.communicate(timeout=20)
+        assert "Traceback" not in out
+        assert process.returncode == 130
 
 
 @pytest.mark.parametrize("after_s", [1.0, 4.0])

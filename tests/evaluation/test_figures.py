@@ -172,6 +172,17 @@ def test_what_was_evaluated_is_drawn_and_said(tmp_path, of, seen):
     assert axes == {"paper": "√(X² + Z²)", "tuned": "norm"}
 
 
+def test_rest_is_that_of_the_preset_and_names_it(tmp_path, of, seen):
+    for preset, said in (("paper", "rest: 0.031 g"), ("tuned", "rest: 0.180 g")):
+        chosen = Choice(counter=bracelet.NAME, preset=preset, overrides={})
+        bracelet.rest(tmp_path / "rest.png", of.rest, chosen)
+        (axes,) = seen["rest"]
+        assert said in [text.get_text() for text in axes.get_legend().get_texts()]
+        assert f"preset {preset}" in axes.get_figure().get_suptitle()
+        bracelet.filtered(tmp_path / "filtered.png", of.walk, chosen)
+        assert f"preset {preset}" in seen["filtered"][0].get_figure().get_suptitle()
+
+
 @pytest.fixture(scope="module")
 def watched(of):
     return events(of.sensed[0])
@@ -236,8 +247,30 @@ def test_bars_stand_at_the_mean_accuracy_of_each_set(tmp_path, seen):
     agreement.accuracy(tmp_path / "bars.png", ROWS)
     heights = [[bar.get_height() for bar in bars] for bars in seen["bars"][0].containers]
     assert heights[0] == pytest.approx([95.0, 90.0])
-    assert heights[1][0] == pytest.approx(80.0)
-    assert np.isnan(heights[1][1])
+    assert heights[1] == pytest.approx([80.0])
+
+
+def test_bars_stand_in_the_middle_of_their_group_without_gaps(tmp_path, seen):
+    sets = {"all": ("a", "b", "c"), "some": ("a", "c"), "one": ("c",)}
+    rows = [row(path=name, dataset=name, counter=counter) for name, counters in sets.items() for counter in counters]
+    agreement.accuracy(tmp_path / "bars.png", rows)
+    middles = [[bar.get_x() + bar.get_width() / 2 for bar in bars] for bars in seen["bars"][0].containers]
+    third = 0.8 / 3
+    assert middles[0] == pytest.approx([-third, 1 - third / 2])
+    assert middles[1] == pytest.approx([0.0])
+    assert middles[2] == pytest.approx([third, 1 + third / 2, 2.0])
+
+
+@pytest.mark.parametrize("count", [2, 6, 7, 12])
+def test_names_of_groups_do_not_run_into_each_other(tmp_path, seen, count):
+    agreement.accuracy(tmp_path / "bars.png", [row(path=f"{k}", dataset=f"F shoulder bag ({k})") for k in range(count)])
+    names = seen["bars"][0].get_xticklabels()
+    boxes = [name.get_window_extent() for name in names]
+    if names[0].get_rotation():
+        pitch_px = boxes[1].x1 - boxes[0].x1
+        assert pitch_px * np.sin(np.radians(names[0].get_rotation())) > names[0].get_fontsize() * canvas.DPI / 72
+    else:
+        assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
 
 
 def test_an_accuracy_below_0_is_written_where_its_bar_would_be(tmp_path, seen):
@@ -262,6 +295,23 @@ def test_published_bars_stand_around_ours(tmp_path, seen):
     assert {height for _, height in published} == {99.0}
     assert [text.get_text() for text in walkers.texts] == ["−5 %"]
     assert [text.get_text() for text in recordings.get_xticklabels()] == ["pocket (set)"]
+
+
+def test_the_legend_has_the_colours_of_the_bars_of_every_panel(tmp_path, seen):
+    bars = [
+        Bar(group=f"{real}", method=method, ours=90.0, published=99.0, real=real)
+        for method, real in (("one", False), ("one", True), ("two", True))
+    ]
+    agreement.against_published(tmp_path / "bars.png", bars)
+    walkers, recordings = seen["bars"]
+    legend = walkers.get_legend()
+    one, two, published = legend.get_patches()
+    assert [text.get_text() for text in legend.get_texts()] == ["one, ours", "two, ours", "published"]
+    ours = [bars[0].get_facecolor() for bars in recordings.containers[::2]]
+    assert [one.get_facecolor(), two.get_facecolor()] == ours
+    assert ours[0] != ours[1]
+    assert published.get_edgecolor() == recordings.containers[1][0].get_edgecolor()
+    assert not published.get_fill()
 
 
 def test_a_papers_figure_has_its_claims(tmp_path, seen, of, monkeypatch):

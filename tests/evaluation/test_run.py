@@ -1,8 +1,13 @@
 """A row for every recording and counter: true ones, and ones that say why there is no count."""
 
+import asyncio
 import dataclasses
+import gc
 import json
 import os
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -151,6 +156,32 @@ async def test_a_process_that_dies_leaves_rows_that_say_so(tmp_path, monkeypatch
 
 def _die(*_):
     os._exit(9)
+
+
+@pytest.mark.full
+async def test_a_pool_that_ends_late_says_nothing_when_cancelled(tmp_path, monkeypatch):
+    class Late(ProcessPoolExecutor):
+        """Its thread sees the ended processes before it is told to stop: what a Ctrl-C meets now and then."""
+
+        def shutdown(self, wait=True, *, cancel_futures=False):
+            time.sleep(0.5)
+            super().shutdown(wait, cancel_futures=cancel_futures)
+
+    monkeypatch.setattr("service.evaluation.run.ProcessPoolExecutor", Late)
+    failed = []
+    monkeypatch.setattr(threading, "excepthook", lambda told: failed.append(told.exc_value))
+    asyncio.get_running_loop().set_exception_handler(lambda _, told: failed.append(told))
+    for k in range(12):
+        save(walk(10), tmp_path / f"{k}.npz")
+    files, _ = find([str(tmp_path)])
+    counting = asyncio.create_task(evaluate(files, CHOSEN, jobs=2, lsb_per_g=32.0, progress=lambda *_: None))
+    await asyncio.sleep(0.1)
+    counting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await counting
+    await asyncio.sleep(0.1)
+    gc.collect()
+    assert failed == []
 
 
 def test_json_holds_a_row_a_line_and_no_nan(tmp_path):

@@ -101,10 +101,26 @@ def test_errors_are_told_equal_ones_together():
     rows = [row(), *(row(f"d/{k}.npz", steps=None, error="no gyroscope") for k in range(3))]
     rows.append(row("d/x.npz", steps=None, error="d/x.npz: empty"))
     text = report(rows)
-    assert "not counted: 4 rows of 4 recordings\n  3 × no gyroscope\n  d/x.npz: empty" in text
+    assert "not counted: 4 of 5 recordings\n  3 × no gyroscope\n  d/x.npz: empty" in text
     many = report([row(f"d/{k}.npz", steps=None, error=f"why {k}") for k in range(13)])
     assert many.splitlines()[-1] == "  … 3 more reasons"
     assert "accuracy" not in many
+
+
+def test_what_some_counters_only_did_not_count_is_told_apart():
+    rows = [row("d/a.npz"), row("d/a.npz", counter="fusion", steps=None, error="no gyroscope")]
+    rows += [row("d/b.npz", counter=name, steps=None, error="empty") for name in ("double_threshold", "fusion")]
+    assert "not counted: 3 of 4 rows (recording × counter): 1 recording by no counter, 1 by some only\n" in report(rows)
+    assert "not counted: 1 of 1 recording\n" in report(rows[1:2])
+
+
+def test_who_learnt_nothing_is_said_once():
+    taught = row("d/a.npz", calibration="middle: 25 samples")
+    others = [row(f"d/{name}.npz", counter="fusion") for name in "ab"]
+    said = "learnt nothing (no method to learn so, counted as they are): fusion"
+    assert report([taught, *others]).count(said) == 1
+    assert report([row("d/a.npz", uncalibrated=True), *others]).count(said) == 1
+    assert "learnt nothing" not in report(others) + report([taught])
 
 
 def test_saturated_recordings_are_named():

@@ -69,7 +69,7 @@ def test_without_time_a_rate_makes_it(tmp_path):
         (GOOD + "0.01,0,0,1\n", "time does not rise at sample 3"),
         ("time_s,x_g,y_g,z_g\n", "a header and no samples"),
         ("# rate_hz: 50\n", "no header"),
-        ("time_s,x_g,y_g,z_g\n0,0,0,1\n", "1 samples; at least 2"),
+        ("time_s,x_g,y_g,z_g\n0,0,0,1\n", "1 sample; at least 2"),
         (GOOD.replace("1.1", "9.9").replace(",1\n", ",9.81\n").replace("0.9", "9.7"), "m/s²"),
         ("# rate_hz: fast\n" + GOOD, "'fast' is no rate"),
         ("# true_steps: 1.5\n" + GOOD, "'1.5' is no whole number"),

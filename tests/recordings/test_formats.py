@@ -108,6 +108,8 @@ def test_no_file_and_no_file_but_a_folder(tmp_path):
     (tmp_path / "b.csv").mkdir()
     with pytest.raises(RecordingError, match="No such file"):
         read(tmp_path / "a.csv")
+    with pytest.raises(RecordingError, match="no such file"):
+        read(tmp_path / "a")
     with pytest.raises(RecordingError, match="directory"):
         read(tmp_path / "b.csv")
 

@@ -82,7 +82,7 @@ def test_stamps_that_jitter_are_no_contradiction(tmp_path, seconds):
         (ROWS.replace("2017/1/3,21:47:38:314\n60", "2017/1/3,21:47:39:314\n60"), "row 3 is before that of row 2"),
         (ROWS.replace("2017/1/3", "2017/2/30"), "no date and time"),
         (ROWS.replace(",-", ",-11"), "powers of two"),
-        (ROWS.split("\n", maxsplit=1)[0], "1 samples; at least 2"),
+        (ROWS.split("\n", maxsplit=1)[0], "1 sample; at least 2"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, text, says):

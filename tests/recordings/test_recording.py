@@ -39,7 +39,7 @@ def test_a_sound_recording_knows_its_length():
         ({"acc_g": np.ones((9, 3))}, "with 10 times it must be (n, 3)"),
         ({"gyro_rad_s": np.ones(10)}, "gyro has shape (10,)"),
         ({"t_s": np.zeros((10, 1))}, "time has shape (10, 1)"),
-        ({"t_s": np.zeros(1), "acc_g": np.ones((1, 3))}, "1 samples; at least 2"),
+        ({"t_s": np.zeros(1), "acc_g": np.ones((1, 3))}, "1 sample; at least 2"),
         ({"t_s": np.array([0, 1, 2, 3, 3, 5, 6, 7, 8, 9.0])}, "time does not rise at sample 4"),
         ({"t_s": np.array([0, 1, 2, 1, 4, 5, 6, 7, 8, 9.0])}, "time does not rise at sample 3"),
         ({"t_s": np.array([0, np.nan, 2, 3, 4, 5, 6, 7, 8, 9.0])}, "time of sample 1 is not finite"),

@@ -6,7 +6,7 @@ import textwrap
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+OUTLINE: Final[dict[str, Any]] = {"edgecolor": "black", "lw": 1.2}
+"""Of a published figure's bar, over ours."""
+LEVEL_GROUPS: Final = 6
+"""More are named aslant."""
+LINE_CHARACTERS: Final = 84
+"""Of all names side by side."""
 FEW_GROUPS: Final = 4
 """Fewer are drawn no wider."""
 BAR_FROM_PERCENT: Final = 1.0
@@ -53,11 +59,12 @@ def accuracy(path: Path, rows: Sequence[Row]) -> Path:
 
     def draw(axes: list[Axes]) -> None:
         width = 0.8 / max(len(by_counter), 1)
+        slots = _slots([(row.dataset, counter) for counter, found in by_counter.items() for row in found], width)
         for number, (counter, found) in enumerate(by_counter.items()):
-            means = [_mean_accuracy([row for row in found if row.dataset == group]) for group in groups]
-            at = np.arange(len(groups)) + (number - (len(by_counter) - 1) / 2) * width
-            _bars(axes[0], at.tolist(), means, width, number, counter)
-        axes[0].set_xticks(range(len(groups)), [_wrapped(group) for group in groups], fontsize="small")
+            means = {group: _mean_accuracy(of) for group in groups if (of := [r for r in found if r.dataset == group])}
+            at = [slots[group, counter] for group in means]
+            _bars(axes[0], at, list(means.values()), width, number, counter)
+        _name_groups(axes[0], groups)
         label(axes[0], title="Mean accuracy over recordings", y="accuracy / %", legend=True)
 
     return picture(path, draw)
@@ -69,9 +76,13 @@ def against_published(path: Path, bars: Sequence[Bar]) -> Path:
     methods = list(dict.fromkeys(bar.method for bar in bars))
 
     def draw(axes: list[Axes]) -> None:
+        from matplotlib.patches import Patch  # noqa: PLC0415  # heavy, and an extra
+
+        ours = [Patch(color=_colour(number), label=f"{method}, ours") for number, method in enumerate(methods)]
+        handles = [*ours, Patch(fill=False, **OUTLINE, label="published")]
         for each, found in zip(axes, panels, strict=True):
             _beside_published(each, found, methods)
-        label(axes[0], title="Accuracies and what the paper claims", legend=True)
+        label(axes[0], title="Accuracies and what the paper claims", legend=True, handles=handles)
 
     return picture(path, draw, panels=len(panels), share_x=False)
 
@@ -79,21 +90,47 @@ def against_published(path: Path, bars: Sequence[Bar]) -> Path:
 def _beside_published(axes: Axes, bars: Sequence[Bar], methods: Sequence[str]) -> None:
     groups = list(dict.fromkeys(bar.group for bar in bars))
     width = 0.8 / len(methods)
+    held = {(bar.group, bar.method) for bar in bars}
+    slots = _slots([(group, method) for group in groups for method in methods if (group, method) in held], width)
     for number, method in enumerate(methods):
         of = [bar for bar in bars if bar.method == method]
-        at = [groups.index(bar.group) + (number - (len(methods) - 1) / 2) * width for bar in of]
+        at = [slots[bar.group, method] for bar in of]
         _bars(axes, at, [bar.ours for bar in of], width, number, f"{method}, ours")
-        claimed = "published" if number == len(methods) - 1 else None
-        axes.bar(at, [bar.published for bar in of], width, fill=False, edgecolor="black", lw=1.2, label=claimed)
-    axes.set_xticks(range(len(groups)), [_wrapped(group, 84 // len(groups)) for group in groups], fontsize="x-small")
+        axes.bar(at, [bar.published for bar in of], width, fill=False, **OUTLINE)
+    _name_groups(axes, groups)
     aside = 0.5 + max(0.0, (FEW_GROUPS - len(groups)) / 2)
     axes.set_xlim(-aside, len(groups) - 1 + aside)
-    label(axes, y=f"{'recordings' if bars[0].real else 'walkers'}: accuracy / %")
+    label(axes, y=f"{'recordings' if bars[0].real else 'walkers'}\naccuracy / %")
+
+
+def _slots(held: Sequence[tuple[str, str]], width: float) -> dict[tuple[str, str], float]:
+    """Return where the bar of each (group, method) stands; methods that have none in a group take no room there."""
+    groups: dict[str, list[str]] = defaultdict(list)
+    for group, method in dict.fromkeys(held):
+        groups[group].append(method)
+    return {
+        (group, method): number + (rank - (len(here) - 1) / 2) * width
+        for number, (group, here) in enumerate(groups.items())
+        for rank, method in enumerate(here)
+    }
+
+
+def _name_groups(axes: Axes, groups: Sequence[str]) -> None:
+    """Name the groups side by side; many of them aslant, where names as long as theirs would run into each other."""
+    if len(groups) > LEVEL_GROUPS:
+        axes.set_xticks(range(len(groups)), groups, fontsize="x-small", rotation=30, ha="right", rotation_mode="anchor")
+    else:
+        names = [_wrapped(group, LINE_CHARACTERS // max(len(groups), 1)) for group in groups]
+        axes.set_xticks(range(len(groups)), names, fontsize="small")
+
+
+def _colour(number: int) -> str:
+    return COLOURS[number % len(COLOURS)]
 
 
 def _bars(axes: Axes, at: Sequence[float], percents: Sequence[float], width: float, number: int, name: str) -> None:
     """Draw bars from 0 to 100; one that ends below 0 has its value written where it would stand."""
-    colour = COLOURS[number % len(COLOURS)]
+    colour = _colour(number)
     axes.bar(at, np.clip(percents, 0, None), width, color=colour, label=name)
     for place, percent in zip(at, percents, strict=True):
         if percent < BAR_FROM_PERCENT:
@@ -189,6 +226,6 @@ def _mean_accuracy(rows: Sequence[Row]) -> float:
     return float(np.mean([accuracy_percent(counted, true) for true, counted in _pairs(rows)])) if rows else np.nan
 
 
-def _wrapped(name: str, width: int = 12) -> str:
+def _wrapped(name: str, width: int) -> str:
     """Break a name into lines, at underscores too."""
-    return "\n".join(textwrap.wrap(name.replace("_", "_ "), max(width, 14))).replace("_ ", "_")
+    return "\n".join(textwrap.wrap(name.replace("_", "_ "), width)).replace("_ ", "_")

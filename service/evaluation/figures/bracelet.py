@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.counters import registry
-from service.counters.double_threshold import PAPER
 from service.evaluation.figures.canvas import COLOURS, label, picture
 from service.evaluation.figures.sources import Floats, Source, middle, times_s
 from service.evaluation.rows import Choice, Row
@@ -20,7 +19,6 @@ from service.samples import GRID_HZ, Band, Step
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-REST_G: Final = PAPER.rest_raw / PAPER.lsb_per_g
 TIME: Final = "time / s"
 
 
@@ -46,6 +44,7 @@ class Counted:
     bands: Sequence[Band]
     steps: Sequence[Step]
     magnitude_g: Floats
+    rest_g: float
     axes: str
     told: str
 
@@ -65,6 +64,7 @@ def counted(source: Source, chosen: Choice = PUBLISHED) -> Counted:
         bands=update.bands + rest.bands,
         steps=update.steps + rest.steps,
         magnitude_g=_two_axes_g(source) if two else source.norm_g,
+        rest_g=params.rest_raw / params.lsb_per_g,
         axes="√(X² + Z²)" if two else "norm",
         told=" ".join([f"{NAME}, preset {chosen.preset}", *(f"{k}={v}" for k, v in chosen.overrides.items())]),
     )
@@ -110,7 +110,9 @@ def filtered(path: Path, source: Source, chosen: Choice = PUBLISHED) -> Path:
     def draw(axes: list[Axes]) -> None:
         axes[0].plot(times_s(part), seen.magnitude_g[part], color=COLOURS[0], lw=0.7, alpha=0.6, label=seen.axes)
         axes[0].plot(seen.t_s[shown], seen.filtered_g[shown], color=COLOURS[1], lw=1.4, label="five-point mean (5)")
-        label(axes[0], title=f"Filtered magnitude: {source.name}", x=TIME, y="acceleration / g", legend=True)
+        label(
+            axes[0], title=f"Filtered magnitude: {source.name}\n{seen.told}", x=TIME, y="acceleration / g", legend=True
+        )
 
     return picture(path, draw)
 
@@ -149,19 +151,21 @@ def false_peaks(path: Path, source: Source, chosen: Choice = PUBLISHED) -> Path:
     return picture(path, draw)
 
 
-def rest(path: Path, source: Source) -> Path:
-    """Figure 7: nobody moves; the paper calls less than one raw unit between peak and valley rest."""
-    part, seen = middle(source), counted(source)
+def rest(path: Path, source: Source, chosen: Choice = PUBLISHED) -> Path:
+    """Figure 7: nobody moves; so little between peak and valley is rest, one raw unit in the paper."""
+    part, seen = middle(source), counted(source, chosen)
+    half_g = seen.rest_g / 2
     shown = _shown(seen.t_s, part)
     middle_g = float(np.median(seen.filtered_g[shown]))
 
     def draw(axes: list[Axes]) -> None:
         axes[0].plot(seen.t_s[shown], seen.filtered_g[shown], color=COLOURS[0], lw=1, label="five-point mean")
-        axes[0].axhspan(
-            middle_g - REST_G / 2, middle_g + REST_G / 2, color=COLOURS[3], alpha=0.3, label=f"rest: {REST_G:.3f} g"
-        )
-        axes[0].set_ylim(middle_g - 0.15, middle_g + 0.15)
-        label(axes[0], title=f"At rest: {source.name}", x=TIME, y="acceleration / g", legend=True)
+        text = f"rest: {seen.rest_g:.3f} g"
+        axes[0].axhspan(middle_g - half_g, middle_g + half_g, color=COLOURS[3], alpha=0.3, label=text)
+        reach_g = max(0.15, 1.2 * half_g)
+        axes[0].set_ylim(middle_g - reach_g, middle_g + reach_g)
+        title = f"At rest: {source.name}\n{seen.told}"
+        label(axes[0], title=title, x=TIME, y=f"{seen.axes} / g", legend=True)
 
     return picture(path, draw)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from service.errors import ParameterError
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 WIDTH_INCH: Final = 9.0
@@ -51,11 +52,23 @@ def picture(path: Path, draw: Draw, *, panels: int = 1, share_x: bool = True, sh
     return path
 
 
-def label(axes: Axes, *, title: str = "", x: str = "", y: str = "", legend: bool = False, columns: int = 5) -> None:
-    """Name what the axes show, units included."""
+def label(
+    axes: Axes,
+    *,
+    title: str = "",
+    x: str = "",
+    y: str = "",
+    legend: bool = False,
+    columns: int = 5,
+    handles: Sequence[Artist] | None = None,
+) -> None:
+    """Name what the axes show, units included; `handles` stand in the legend instead of what the axes hold."""
     axes.set(**{name: text for name, text in (("xlabel", x), ("ylabel", y)) if text})
     figure = axes.get_figure(root=True)
     if title and figure is not None:
         figure.suptitle(title)
     if legend:  # above the axes, where it hides nothing
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize="small", frameon=False)
+        shown = axes.get_legend_handles_labels()[0] if handles is None else handles
+        axes.legend(
+            handles=shown, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize="small", frameon=False
+        )

@@ -20,7 +20,7 @@ SIGNALS: Final[dict[str, Callable[[Path, Sources, Choice], Path]]] = {
     "filtered": lambda path, of, chosen: bracelet.filtered(path, of.walk, chosen),
     "thresholds_and_steps": lambda path, of, chosen: bracelet.thresholds(path, of.walk, chosen),
     "false_peaks": lambda path, of, chosen: bracelet.false_peaks(path, of.walk, chosen),
-    "rest": lambda path, of, _: bracelet.rest(path, of.rest),
+    "rest": lambda path, of, chosen: bracelet.rest(path, of.rest, chosen),
     "step_maxima": lambda path, of, _: phones.maxima(path, of),
     "gait_cycle": lambda path, of, _: phones.gait_cycle(path, of.pocket),
     "update_and_reject": lambda path, of, _: phones.regions(path, of.sensed),
