@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ def accepted(name: str, preset: str, chosen: dict[str, object]) -> Any:
     except ParameterError as fault:
         names = {field.name for field in dataclasses.fields(registry.kind(name).params)}
         assert fault.name.removeprefix(f"{name}.") in names
-        assert sum(word.strip(":,.=") in names for word in str(fault).replace("=", " ").split()) >= 2
+        assert sum(word in names for word in re.split(r"[\s.:,=]+", str(fault))) >= 2
         return None
 
 
