@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
@@ -88,8 +88,25 @@ def _refusal(status: int) -> Callable[[Request, Exception], Awaitable[JSONRespon
 async def _invalid(_request: Request, error: Exception) -> JSONResponse:
     """Say what FastAPI found wrong as the sentence that every other refusal is."""
     found = error.errors() if isinstance(error, RequestValidationError) else []
-    detail = "; ".join(f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}" for fault in found)
+    detail = "; ".join(dict.fromkeys(map(_sentence, found)))
     return JSONResponse({"detail": detail}, status_code=422)
+
+
+_NO_NAMES = frozenset({"body", "query", "path", "float", "str", "int", "bool"})
+"""Parts of a fault's place that say where it was sent, or which of several kinds it was tried as."""
+
+
+def _sentence(fault: Mapping[str, Any]) -> str:
+    """Return one fault as `name = value: what is allowed`."""
+    name = ".".join(str(part) for part in fault["loc"] if part not in _NO_NAMES)
+    allowed = fault["msg"][:1].lower() + fault["msg"][1:]
+    if fault["type"] == "json_invalid":
+        return f"the body is no JSON: {fault.get('ctx', {}).get('error', allowed)}"
+    if not name:
+        return f"the body: {allowed}; send JSON, with the header Content-Type: application/json"
+    if fault["type"] == "missing":
+        return f"{name}: it is missing"
+    return f"{name} = {fault['input']!r}: {allowed}"
 
 
 def _add_live(app: FastAPI, supervisor: Supervisor) -> None:

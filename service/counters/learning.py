@@ -23,6 +23,10 @@ FEWEST_SPACINGS: Final = 4
 """Between the steps of one certain bout; fewer are a stumble, not a pace. Ours."""
 FEWEST_SWINGS: Final = 2
 """Of each direction: two strides. Ours."""
+UNEVEN: Final = 1.5
+"""A walk swings as often to as fro; more than this, and one besides, are not its swings. Ours."""
+STANDS_OUT: Final = 2.0
+"""A threshold of less than this many times the noise of rest would let rest pass. Ours."""
 
 
 class Learner(Protocol):
@@ -159,10 +163,14 @@ def _thresholds(extrema: Sequence[float], params: GyroZeroCrossingParams) -> Les
     up, down = _swings(extrema, params.rest_rad_s)
     if min(up, down) < FEWEST_SWINGS:
         raise LearningError("no swings to and fro were found: walk with the device where the leg or arm turns it")
+    if max(up, down) > UNEVEN * min(up, down) + 1:
+        raise LearningError(f"{up} swings one way and {down} the other are no even walk: walk on, evenly and slowly")
     learnt = gyro_zero_crossing.passing(np.array(extrema), params)
+    if min(learnt.peak_rad_s, learnt.valley_rad_s) < STANDS_OUT * params.rest_rad_s:
+        raise LearningError("the swings hardly stand out of rest: wear the device where the leg or arm turns it")
     return Lesson(
         params={"peak_rad_s": learnt.peak_rad_s, "valley_rad_s": learnt.valley_rad_s},
-        detail=f"peaks from {learnt.peak_rad_s:.2f} and valleys from {learnt.valley_rad_s:.2f} rad/s on count, "
+        detail=f"peaks from {learnt.peak_rad_s:.2g} and valleys from {learnt.valley_rad_s:.2g} rad/s on count, "
         f"learnt from {up} and {down} swings",
     )
 

@@ -123,7 +123,7 @@ async def test_a_device_is_in_one_walking_trial_and_must_stream():
         (BOTH | {"wrists": {"sim-3": "left"}}, 422, "sim-3"),
         (BOTH | {"wrists": {"sim-1": "ankle"}}, 422, "left"),
         (BOTH | {"name": ""}, 422, "at least 1"),
-        (BOTH | {"colour": "red"}, 422, "Extra"),
+        (BOTH | {"colour": "red"}, 422, "extra inputs"),
     ],
 )
 async def test_a_wrong_wish_is_refused_with_a_sentence(wanted, status, said):

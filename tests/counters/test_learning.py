@@ -166,3 +166,19 @@ def test_no_swing_teaches_no_threshold(rate):
 def test_a_device_without_a_gyroscope_is_told():
     with pytest.raises(CounterError, match="gyroscope"):
         SLOWEST_WALK.learner(gyro_zero_crossing.TUNED).update(WALKS["slow"])
+
+
+@pytest.mark.parametrize(
+    ("extrema", "said"),
+    [
+        ([1.0] * 4 + [-1.0] * 8, "4 swings one way and 8 the other"),
+        ([0.05] * 8 + [-1.0] * 8, "hardly stand out of rest"),
+    ],
+)
+def test_swings_that_are_no_walk_teach_nothing(extrema, said):
+    with pytest.raises(LearningError, match=said):
+        SLOWEST_WALK.conclude(extrema, gyro_zero_crossing.PAPER)
+
+
+def test_swings_one_more_to_than_fro_are_a_walk():
+    assert SLOWEST_WALK.conclude([1.0] * 3 + [-1.0] * 2, gyro_zero_crossing.PAPER).params["peak_rad_s"] == 0.8
