@@ -60,7 +60,7 @@ def add_counter_routes(app: FastAPI, supervisor: Supervisor) -> None:
     """Add the routes of counters and of a device's lineup to `app`."""
 
     @app.get("/api/v1/counters", tags=["counters"])
-    async def list_counters() -> models.Page[models.CounterModel]:
+    def list_counters() -> models.Page[models.CounterModel]:  # in a thread: the first filter imports scipy
         """List every counter with its parameters, their units, ranges and presets."""
         return models.Page(items=[counter_view(kind) for kind in registry.COUNTERS.values()])
 

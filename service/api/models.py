@@ -237,6 +237,7 @@ class ParameterModel(BaseModel):
     name: str = Field(examples=["rest_raw"])
     text: str = Field(description="What it does")
     unit: str | None
+    whole: bool = Field(description="Whether it must be a whole number")
     low: float | None = Field(description="Smallest value, inclusive")
     high: float | None = Field(description="Largest value, inclusive")
     options: list[str] | None = Field(description="The words it takes")
@@ -249,7 +250,11 @@ class CounterModel(BaseModel):
     """A counter that can be asked for."""
 
     name: str = Field(examples=["double_threshold"])
-    sensors: list[str] = Field(examples=[["accelerometer"]])
+    source: str = Field(description="The paper it is from", examples=["Adaptive double threshold: Wang, Peng, Zhou"])
+    sensors: list[str] = Field(description="What a device must have", examples=[["accelerometer"]])
+    latency_s: dict[str, float] = Field(
+        description="Longest time from a step to its confirmation, by preset", examples=[{"paper": 4.6, "tuned": 8.2}]
+    )
     calibrations: list[str] = Field(
         description="Ways to learn parameters of it from a walk on a device", examples=[["walk", "middle"]]
     )

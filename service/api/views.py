@@ -7,6 +7,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from service.api import models
+from service.counters import describe
 from service.counters.registry import CounterKind
 from service.pipeline.device import Device
 from service.pipeline.lifecycle import State
@@ -128,7 +129,12 @@ def counter_view(kind: CounterKind) -> models.CounterModel:
     """Return a counter of the registry with its parameters."""
     parameters = [_parameter_view(field, kind) for field in dataclasses.fields(kind.params)]
     return models.CounterModel(
-        name=kind.name, sensors=sorted(kind.sensors), calibrations=list(kind.calibrations), parameters=parameters
+        name=kind.name,
+        source=describe.source(kind),
+        sensors=sorted(kind.sensors),
+        latency_s={preset: describe.latency_s(kind, preset) for preset in kind.presets},
+        calibrations=list(kind.calibrations),
+        parameters=parameters,
     )
 
 
@@ -138,6 +144,7 @@ def _parameter_view(field: dataclasses.Field[Any], kind: CounterKind) -> models.
         name=field.name,
         text=meta["text"],
         unit=meta.get("unit"),
+        whole=isinstance(field.default, int),
         low=meta.get("low"),
         high=meta.get("high"),
         options=list(meta["options"]) if "options" in meta else None,

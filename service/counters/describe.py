@@ -33,8 +33,8 @@ def overview(*, whole: bool = False) -> list[Line]:
         (
             kind.name,
             ", ".join(sorted(kind.sensors)),
-            f"{_latency_s(kind, 'paper')}, {_latency_s(kind, 'tuned')} s",
-            _source(kind) if whole else _authors(kind),
+            f"{latency_s(kind, 'paper'):.1f}, {latency_s(kind, 'tuned'):.1f} s",
+            source(kind) if whole else _authors(kind),
         )
         for kind in registry.COUNTERS.values()
     ]
@@ -55,11 +55,12 @@ def markdown() -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _latency_s(kind: CounterKind, preset: str) -> str:
-    return f"{kind.build(kind.presets[preset]).latency_s:.1f}"
+def latency_s(kind: CounterKind, preset: str) -> float:
+    """Return the longest time from a step to its confirmation with the parameters of a preset."""
+    return round(kind.build(kind.presets[preset]).latency_s, 3)
 
 
-def _source(kind: CounterKind) -> str:
+def source(kind: CounterKind) -> str:
     """Return the first sentence of the counter's module, which names its paper."""
     text = sys.modules[kind.build.__module__].__doc__ or ""
     return text.split("\n\n", maxsplit=1)[0].split("\n", maxsplit=1)[0].strip()
@@ -67,7 +68,7 @@ def _source(kind: CounterKind) -> str:
 
 def _authors(kind: CounterKind) -> str:
     """Return what stands before the paper's DOI, without what the counter is called."""
-    before = _source(kind).partition(", doi ")[0]
+    before = source(kind).partition(", doi ")[0]
     return textwrap.shorten(re.split(": | of ", before)[-1], SOURCE_COLUMNS, placeholder=" …")
 
 

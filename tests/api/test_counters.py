@@ -10,6 +10,7 @@ from stage import staged
 
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
+from service.counters import registry
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -27,6 +28,11 @@ async def test_every_counter_tells_its_parameters_with_unit_range_and_presets(wa
     rest = {parameter["name"]: parameter for parameter in double["parameters"]}["rest_raw"]
     assert (rest["unit"], rest["low"], rest["high"]) == ("raw units", 0, 64)
     assert rest["presets"] == {"paper": 1.0, "tuned": 5.75}
+    assert double["latency_s"]["tuned"] == pytest.approx(registry.make("double_threshold").latency_s)
+    assert "Wang" in double["source"]
+    whole = {parameter["name"] for parameter in double["parameters"] if parameter["whole"]}
+    assert "bout" in whole
+    assert "rest_raw" not in whole
     for parameter in (parameter for item in items for parameter in item["parameters"]):
         assert parameter["text"]
         assert parameter["options"] or (parameter["unit"] is not None and parameter["low"] < parameter["high"])
