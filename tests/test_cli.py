@@ -177,6 +177,7 @@ def test_playing_a_recording_once_ends_by_itself(tmp_path):
     assert "has been played" in out
 
 
+@pytest.mark.full
 def test_a_demo_that_has_played_its_recording_shows_the_bracelet_gone():
     port = free_port()
     with running("demo", "--port", port, "--walk", "normal:8", "--once", "--speed", 4) as demo:

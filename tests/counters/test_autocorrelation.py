@@ -125,6 +125,7 @@ def test_agrees_with_the_text(signal, period, lags, lock, idle, rho_min, hop, pa
     assert indices(steps_of(params, np.abs(norm))) == oracle(np.abs(norm), params)
 
 
+@pytest.mark.full
 @few
 @given(cut=cut_signals(), params=st.sampled_from([STRIDE, replace(STRIDE, credit="retrospective", bout=7)]))
 def test_strides_keep_the_contract(cut, params):

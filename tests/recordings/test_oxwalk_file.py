@@ -96,7 +96,7 @@ def test_irregular_stamps_are_kept_to_the_microsecond(tmp_path_factory, steps_us
         (rows(3) + "2022-12-09 10:30:00.030,0,0\n", "line 5: 3 columns, the header has 5"),
         (rows(3) + "2022-12-09 10:30:00.030Z,0,0,1,0\n", "some stamps have a time zone"),
         (rows(3) + rows(3), "time does not rise at sample 3"),
-        (rows(1), "1 samples"),
+        (rows(1), "1 sample;"),
         (rows(3).replace("0.99", "9.79"), "m/s²"),
     ],
 )
