@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from browser.conftest import Scripted
 from browser.scripted import AT, ScriptedServer, device
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Route, expect
 
 pytestmark = pytest.mark.full
 
@@ -144,6 +144,23 @@ def test_a_server_that_does_not_answer_is_told_until_it_does(scripted: Scripted)
     page.unroute(f"**/{PATH}")
     expect(panel.get_by_role("alert")).to_be_hidden(timeout=10_000)
     server.errors.clear()
+
+
+def test_nothing_can_be_typed_before_the_first_answer(scripted: Scripted) -> None:
+    server = scripted(device())
+    server.api |= {"GET api/v1/counters": COUNTERS, f"GET {PATH}": listing()}
+    page = server.open()
+    held: list[Route] = []
+    page.route(f"**/{PATH}", lambda route: held.append(route))  # noqa: PLW0108 - Playwright marks the function
+    page.get_by_role("button", name="Calibrate Left wrist").click()
+    panel = page.get_by_role("region", name="Calibrations", exact=True)
+    expect(panel).to_contain_text("Asking what can be calibrated…")
+    expect(panel.get_by_label("How many")).to_be_hidden()
+    while not held:
+        page.wait_for_timeout(20)
+    held[0].fulfill(json=listing())
+    expect(panel.get_by_label("How many")).to_have_value("50")
+    expect(panel.get_by_text("Asking")).to_be_hidden()
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ export class CalibrationPanel {
   element;
   #form;
   #none = el("p", { className: "hint", hidden: true }, "No counter can be calibrated on this bracelet.");
+  #asking = el("p", { className: "hint" }, "Asking what can be calibrated…");
   #error = el("p", { className: "notice bad", role: "alert", hidden: true });
   #said = el("p", { className: "notice good", role: "status", hidden: true });
   #recording;
@@ -34,12 +35,13 @@ export class CalibrationPanel {
 
   constructor() {
     this.#form = new CalibrationForm((body) => this.#begin(body));
+    this.#form.element.hidden = true; // until there is something to choose: what is typed before that would be lost
     this.#recording = new Recording({
       finish: (number) => this.#finish(number),
       cancel: (number) => this.#forget(number),
     });
     this.element = el("section", { className: "panel", hidden: true, "aria-label": "Calibrations" },
-      this.#none, this.#form.element, this.#recording.element, this.#error, this.#said, this.#list);
+      this.#asking, this.#none, this.#form.element, this.#recording.element, this.#error, this.#said, this.#list);
     this.#poll = new Poll(() => this.#ask());
   }
 
@@ -83,6 +85,7 @@ export class CalibrationPanel {
   }
 
   #fail(error) {
+    this.#asking.hidden = true;
     setText(this.#error, error);
     this.#error.hidden = false;
     this.#cut = false;
@@ -91,6 +94,7 @@ export class CalibrationPanel {
   #fill(calibrations) {
     const able = offers(this.#counters, this.#device);
     const recording = calibrations.find(({ state }) => state === "recording");
+    this.#asking.hidden = true;
     this.#none.hidden = able.length > 0;
     this.#form.offer(able);
     this.#form.element.hidden = Boolean(recording) || able.length === 0;
