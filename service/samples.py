@@ -170,6 +170,25 @@ class DeviceInfo:
     model: str | None = None
     firmware: str | None = None
     sensors: Sensors | None = None
+    history_samples: int | None = None
+    """How many of its newest samples it can send again; 0 or None: none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reply:
+    """A device's answer to a request.
+
+    `request` names it ("start", "stop", "rate", "range", "time", "history"); `why` is a sentence where it was not
+    `accepted`. Of history, the device has sent again all that it held of the range asked for: `samples` of them from
+    `first` (u32) of boot `boot` on. What was asked for and lies outside of that it does not have any more.
+    """
+
+    request: str
+    accepted: bool
+    why: str = ""
+    boot: int | None = None
+    first: int = 0
+    samples: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,6 +254,30 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Awaited:
+    """Not numbered: samples that did not arrive and may still come; until then what is behind them is tentative."""
+
+    from_s: float
+    to_s: float
+    index: int
+    samples: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Corrected:
+    """Durable: samples came late, and from `from_s` to `to_s` was counted again.
+
+    Of the primary's steps told behind them `removed` are none, and `added` were not told.
+    """
+
+    boot: int
+    from_s: float
+    to_s: float
+    removed: int
+    added: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rebooted:
     """Durable: the device started again; its device time begins at zero, its count goes on."""
 
@@ -283,4 +326,40 @@ class Gridded:
     block: SampleBlock
 
 
-Event = StepCounted | Tentative | Gap | Rebooted | Segmented | Described | Signal | Counting | Gridded
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Received:
+    """Never published: samples that are believed and were not there before, for whoever keeps them.
+
+    The block's index is unwrapped; `run` counts the device's boots since the session began, from 0.
+    """
+
+    run: int
+    block: RawBlock
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heard:
+    """Never published: the device described itself by a value of a characteristic, before sample `index` of `run`."""
+
+    run: int
+    boot: int
+    index: int
+    characteristic: str
+    data: bytes
+
+
+Event = (
+    StepCounted
+    | Tentative
+    | Gap
+    | Awaited
+    | Corrected
+    | Rebooted
+    | Segmented
+    | Described
+    | Signal
+    | Counting
+    | Gridded
+    | Received
+    | Heard
+)

@@ -27,6 +27,7 @@ from service.samples import (
     Packet,
     RawBlock,
     Rebooted,
+    Reply,
     Segmented,
     Sensor,
     Sensors,
@@ -123,7 +124,7 @@ class Tracker:
 
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
-        said: RawBlock | DeviceInfo | None = None
+        said: RawBlock | DeviceInfo | Reply | None = None
         try:
             said = self._wearable.feed(packet.characteristic, packet.data)
             if isinstance(said, RawBlock):

@@ -225,7 +225,7 @@ class Bracelet:
         reader = self._readers.get(characteristic)
         return None if reader is None else reader(data)
 
-    def history(self, first: int, last: int) -> Sequence[Write]:  # noqa: ARG002
+    def history(self, boot: int, first: int, samples: int) -> Sequence[Write]:  # noqa: ARG002
         """Return nothing: this bracelet keeps no history yet."""
         return ()
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.samples import DeviceInfo, RawBlock
+from service.samples import DeviceInfo, RawBlock, Reply
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,10 +32,11 @@ class Subscribe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Write:
-    """Write a characteristic, with response."""
+    """Write a characteristic, with response. An `optional` one may be missing."""
 
     characteristic: str
     data: bytes
+    optional: bool = False
 
 
 Action = Read | Subscribe | Write
@@ -51,8 +52,8 @@ class Wearable(Protocol):
     def handshake(self) -> Sequence[Action]:
         """Return what to do after connecting, in order."""
 
-    def feed(self, characteristic: str, data: bytes) -> RawBlock | DeviceInfo | None:
+    def feed(self, characteristic: str, data: bytes) -> RawBlock | DeviceInfo | Reply | None:
         """Decode one value; None where it holds nothing for us; WireError where it breaks the format."""
 
-    def history(self, first: int, last: int) -> Sequence[Write]:
-        """Return the writes that ask for samples `first`…`last` again; empty where a device keeps none."""
+    def history(self, boot: int, first: int, samples: int) -> Sequence[Write]:
+        """Return the writes that ask for `samples` samples from `first` (u32) on again; empty where it keeps none."""

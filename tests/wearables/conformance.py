@@ -98,4 +98,4 @@ def check_any_bytes(case, characteristic, data):
 
 def check_history(case):
     """Asking for samples again is a list of writes, perhaps an empty one."""
-    assert all(isinstance(write, Write) for write in ready(case).history(0, 1000))
+    assert all(isinstance(write, Write) for write in ready(case).history(1, 0, 1000))
