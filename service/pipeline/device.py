@@ -13,12 +13,14 @@ from service.links.ble import Sighting
 from service.links.contract import Link
 from service.pipeline.calibration import Calibration, Plan
 from service.pipeline.calibrations import Calibrations
+from service.pipeline.journal import Journal
 from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State, advance, backoff_s
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Publish, Session
+from service.store.values import Resumable
+from service.tracking.backfill import BackfillTracker
 from service.tracking.fitness import why_not
-from service.tracking.tracker import Tracker
 from service.wearables.contract import Wearable
 
 logger = logging.getLogger(__name__)
@@ -27,14 +29,25 @@ logger = logging.getLogger(__name__)
 class Device:
     """One device, from the first time it is heard."""
 
-    def __init__(self, sighting: Sighting, wearable: Wearable, lineup: Lineup, publish: Publish) -> None:
-        self.address = sighting.address
-        self.name = sighting.name
-        self.rssi_dbm: int | None = sighting.rssi_dbm
+    def __init__(
+        self,
+        address: str,
+        wearable: Wearable,
+        lineup: Lineup,
+        publish: Publish,
+        *,
+        name: str | None = None,
+        journal: Journal | None = None,
+    ) -> None:
+        self.address = address
+        self.name = name
+        self.rssi_dbm: int | None = None
         self.wearable = wearable
         self.lineup = lineup
-        tracker = Tracker(wearable, lineup.makers, primary=lineup.primary)
-        self.session = Session(lambda: self.id, tracker, publish)
+        self._asked_lineup = lineup.plain()
+        """As the service was told to count when the session began."""
+        self._publish = publish
+        self.session = self._new_session(journal)
         self.calibrations = Calibrations(self.session)
         self.state = State.SEEN
         self.reason: str | None = None
@@ -43,8 +56,52 @@ class Device:
         self.not_before_s = 0.0
         """Monotonic time before which no attempt is made."""
         self.task: asyncio.Task[None] | None = None
+        self.keeping: asyncio.Task[None] | None = None
+        """Has what the session tells stored."""
+        self.on_new_session: Callable[[Device], None] = lambda _: None
+        """Called when another session has begun, to begin keeping it."""
         self._failures = 0
         self._told_s = 0.0
+
+    @classmethod
+    def restored(cls, found: Resumable, wearable: Wearable, publish: Publish, journal: Journal) -> Device:
+        """Return the device of a stored session as it was at its last snapshot; what was stored since is to be replayed.
+
+        SnapshotError, CounterError, ParameterError or KeyError where
+        the session cannot go on.
+        """
+        about = found.about or {}
+        kept = Lineup.from_plain(about["lineup"])
+        device = cls(about["address"], wearable, kept, publish, name=about["name"], journal=journal)
+        device._asked_lineup = about["asked"]
+        device.wanted = about["wanted"]
+        device.state = State.LOST if device.wanted else State.DISCONNECTED
+        device.session.resume(found)
+        return device
+
+    def obey(self, lineup: Lineup) -> None:
+        """Count as the service is told to now, if that is not what it was told when the session began."""
+        if self._asked_lineup == lineup.plain():
+            return
+        self._asked_lineup = lineup.plain()
+        try:
+            self.count_with(lineup)
+        except CounterError as error:
+            logger.warning("%s goes on with its counters: %s", self.id, error)
+
+    def _new_session(self, journal: Journal | None) -> Session:
+        tracker = BackfillTracker(self.wearable, self.lineup.makers, primary=self.lineup.primary)
+        return Session(lambda: self.id, tracker, self._publish, journal, self._about)
+
+    def _about(self) -> dict[str, object]:
+        """Return what a restart needs beside the count, as plain data."""
+        return {
+            "address": self.address,
+            "name": self.name,
+            "wanted": self.wanted,
+            "lineup": self.lineup.plain(),
+            "asked": self._asked_lineup,
+        }
 
     @property
     def id(self) -> str:
@@ -59,8 +116,8 @@ class Device:
     def count_with(self, lineup: Lineup) -> None:
         """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
         registry.require_sensors(lineup.primary, self.session.tracker.info.sensors)
-        self.session.change_counters(lineup)
         self.lineup = lineup
+        self.session.change_counters(lineup)
 
     def require_streaming(self) -> None:
         """Raise NotNowError unless the device streams."""
@@ -105,6 +162,45 @@ class Device:
         """Close its link."""
         if self.task is not None:
             self.task.cancel()
+
+    async def close(self) -> None:
+        """Close its link, and store what is not stored yet."""
+        await self._rest()
+        await self.session.close()
+
+    async def end_session(self) -> None:
+        """End the session and begin another that counts from nothing; a wanted device is connected again by itself."""
+        wanted = self.wanted
+        await self._rest()
+        await self.session.close(ended=True)
+        self._begin_anew()
+        if wanted:
+            self.want()
+
+    async def drop_session(self) -> None:
+        """Leave the device alone, keep nothing of its session, and begin another that counts from nothing."""
+        if self.wanted:
+            self.unwant()
+        await self._rest()
+        self.session.journal.drop()
+        self._begin_anew()
+
+    async def _rest(self) -> None:
+        """Close its link and stop storing; return when both have ended."""
+        self.stop()
+        for task in (self.task, self.keeping):
+            if task is not None:
+                task.cancel()
+                await asyncio.wait({task})
+
+    def _begin_anew(self) -> None:
+        self.calibrations.leave()
+        before = self.session
+        self.session = self._new_session(before.journal.successor())
+        self.session.take_over(before)
+        self.calibrations = Calibrations(self.session)
+        self.session.tell(DeviceChanged(), time.time_ns())
+        self.on_new_session(self)
 
     async def run(self, link: Link, settled: asyncio.Event, jitter: Callable[[], float]) -> None:
         """Hold the link until it is lost or no longer wanted; `settled` is set once it is connected or has failed."""

@@ -13,10 +13,12 @@ import logging
 import random
 from collections.abc import AsyncIterator, Callable, Collection
 
-from service.errors import LinkError, UnknownDeviceError
+from service.errors import LinkError, NotNowError, StoreError, UnknownDeviceError
 from service.links.ble import PLATFORM, Backend, BleLink, Sighting, scanning
+from service.pipeline.archive import Archive
 from service.pipeline.device import Device
 from service.pipeline.hub import Hub
+from service.pipeline.journal import Journal
 from service.pipeline.lifecycle import Cause
 from service.pipeline.lineup import Lineup
 from service.wearables.contract import Wearable
@@ -46,8 +48,11 @@ class Supervisor:
         lineup: Lineup,
         wanted: Collection[str] | None = None,
         backend: Backend = PLATFORM,
+        archive: Archive | None = None,
     ) -> None:
         self.hub = hub
+        self._archive = archive
+        self._tasks: asyncio.TaskGroup | None = None
         self.trouble: LinkError | None = None
         """Why nothing can be heard at the moment; None while the scanner works."""
         self._make_wearable = make_wearable
@@ -82,17 +87,52 @@ class Supervisor:
             device.unwant()
         return device
 
+    @property
+    def store_trouble(self) -> StoreError | None:
+        """Why nothing is stored at the moment; None while all is well, or where nothing is to be stored."""
+        return None if self._archive is None else self._archive.trouble
+
+    async def assign(self, key: str, person: str) -> None:
+        """Make a person the owner of a device's data; UnknownDeviceError, NotNowError where nothing is stored."""
+        await self._kept.assign(self.device(key), person)
+
+    async def forget(self, person: str) -> tuple[int, list[Device]]:
+        """Delete all data of a person for good; return how many sessions were deleted, and whose devices were in use."""
+        return await self._kept.forget(person, self.devices)
+
+    @property
+    def _kept(self) -> Archive:
+        if self._archive is None:
+            raise NotNowError("nothing is stored: start the service with --store")
+        return self._archive
+
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Scan and connect while the context is open; leaving it closes every link."""
+        """Go on with stored sessions, scan and connect while the context is open; leaving it closes every link."""
         async with asyncio.TaskGroup() as tasks:
-            loop = tasks.create_task(self._run(tasks), name="supervisor")
+            keeping = [tasks.create_task(self._archive.keep_house(), name="house")] if self._archive else []
+            self._tasks = tasks
+            if self._archive is not None:
+                for device in await self._archive.resume(self._make_wearable, self._lineup, self.hub):
+                    self._remember(device)
+            keeping.append(tasks.create_task(self._run(tasks), name="supervisor"))
             try:
                 yield
             finally:
-                for device in self._devices.values():
-                    device.stop()
-                loop.cancel()
+                for task in keeping:
+                    task.cancel()
+                await asyncio.gather(*(device.close() for device in self._devices.values()), return_exceptions=True)
+                self._tasks = None
+
+    def _remember(self, device: Device) -> None:
+        """Take a device into the table, and keep what its session tells."""
+        self._devices[device.address] = device
+        device.on_new_session = self._keep
+        self._keep(device)
+
+    def _keep(self, device: Device) -> None:
+        if self._tasks is not None:
+            device.keeping = self._tasks.create_task(device.session.keep(), name=f"keep {device.address}")
 
     async def _run(self, tasks: asyncio.TaskGroup) -> None:
         while True:
@@ -123,9 +163,12 @@ class Supervisor:
         device = self._devices.get(sighting.address)
         if device is None:
             wearable = self._make_wearable()
-            device = Device(sighting, wearable, self._lineup, self.hub.publish)
+            journal = Journal(self._archive.store) if self._archive else None
+            device = Device(
+                sighting.address, wearable, self._lineup, self.hub.publish, name=sighting.name, journal=journal
+            )
             device.wanted = self._is_wanted(sighting)
-            self._devices[sighting.address] = device
+            self._remember(device)
         device.heard(sighting, tell_every_s=SEEN_EVERY_S)
         return device
 

@@ -8,6 +8,9 @@ hold it (over Bluetooth some milliseconds of radio, and what a device waits betw
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 WINDOW_NS = 60_000_000_000
 """Offsets are looked at over one to two of these: ±200 ppm of drift move them by less than 25 ms."""
 _SMOOTHING = 0.05
@@ -59,3 +62,11 @@ class HostClock:
     def _offset(self) -> int:
         least = self._least or 0
         return least if self._before is None else min(least, self._before)
+
+    def snapshot(self) -> dict[str, Any]:
+        """Return the state as plain data."""
+        return dict(vars(self))
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take over a snapshot's state."""
+        vars(self).update(state)

@@ -54,7 +54,9 @@ class Tally:
     packets: int = 0
     packets_bad: int = 0
     packets_duplicate: int = 0
+    packets_reordered: int = 0
     samples: int = 0
+    samples_awaited: int = 0
     samples_lost: int = 0
     samples_saturated: int = 0
     gaps: int = 0
