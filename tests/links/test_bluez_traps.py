@@ -13,32 +13,34 @@ from service.wearables import bracelet as wire
 from service.wearables.contract import Read
 
 
-class Watchers:
-    """Who is called with a value of a characteristic. BlueZ's backend keeps them until `disconnect()` (bleak #2002)."""
+class Subscribers:
+    """Who asked for a characteristic's values. BlueZ forgets them when their client disconnects, not with the link, and
+    gives each value to the newest as often as there are any (bleak #2002).
+    """
 
     def __init__(self):
-        self.callbacks = {}
+        self.of = {}
         self.calls = 0
 
     def like_bluez(self, client):
-        """A client class over `client` that keeps its callbacks here."""
-        watchers = self
+        """A client class over `client` that is remembered here."""
+        subscribers = self
 
         class BluezLike(client):
             async def start_notify(self, characteristic, callback, **kwargs):
-                mine = watchers.callbacks.setdefault(characteristic.uuid, [])
-                mine.append((self, callback))
+                clients = subscribers.of.setdefault(characteristic.uuid, [])
+                clients.append(self)
 
                 def notified(value):
-                    for _, call in tuple(mine):
-                        watchers.calls += characteristic.uuid == wire.DATA
-                        call(value)
+                    for _ in tuple(clients):
+                        subscribers.calls += characteristic.uuid == wire.DATA
+                        callback(value)
 
                 await super().start_notify(characteristic, notified, **kwargs)
 
             async def disconnect(self):
-                for mine in watchers.callbacks.values():
-                    mine[:] = [(client, call) for client, call in mine if client is not self]
+                for clients in subscribers.of.values():
+                    clients[:] = [client for client in clients if client is not self]
                 await super().disconnect()
 
         return BluezLike
@@ -56,8 +58,8 @@ async def taken(link, n):
 async def test_without_a_disconnect_each_reconnect_brings_one_copy_more():
     """The trap itself, so that the test below can fail."""
     async with on_air(speed=8) as (gatt, sighting, backend):
-        watchers, heard, copies = Watchers(), [], []
-        client = watchers.like_bluez(backend.client)
+        subscribers, heard, copies = Subscribers(), [], []
+        client = subscribers.like_bluez(backend.client)
         for _ in range(3):
             bleak = BleakClient(sighting.handle, backend=client)
             await bleak.connect()
@@ -72,17 +74,17 @@ async def test_without_a_disconnect_each_reconnect_brings_one_copy_more():
 
 async def test_after_any_number_of_losses_each_notification_comes_once():
     async with on_air(speed=30) as (gatt, sighting, backend):
-        watchers = Watchers()
-        bluez = Backend(scanner=backend.scanner, client=watchers.like_bluez(backend.client))
+        subscribers = Subscribers()
+        bluez = Backend(scanner=backend.scanner, client=subscribers.like_bluez(backend.client))
         for _ in range(4):
-            sent, calls = gatt.statistics().packets, watchers.calls
+            sent, calls = gatt.statistics().packets, subscribers.calls
             with contextlib.suppress(LinkError):
                 async with link_to(sighting, bluez) as link:
                     await taken(link, 6)
                     await gatt.drop_link()
                     await taken(link, 1_000_000)
-            assert 6 <= watchers.calls - calls <= gatt.statistics().packets - sent
-        assert all(mine == [] for mine in watchers.callbacks.values())
+            assert 6 <= subscribers.calls - calls <= gatt.statistics().packets - sent
+        assert all(clients == [] for clients in subscribers.of.values())
 
 
 async def test_what_the_platform_calls_after_the_end_fills_no_queue():

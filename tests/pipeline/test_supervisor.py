@@ -88,7 +88,7 @@ async def test_a_disconnected_device_is_left_alone_under_its_new_address_too():
         async with radio.air.bracelet(body, **FAST):
             known = await radio.streams()
             radio.supervisor.disconnect("sim-1")
-            await radio.until(lambda: known.task.done())
+            await radio.until(known.task.done)
         body.device_id = "second"
         async with radio.air.bracelet(body, **FAST) as second:
             await radio.until(lambda: known.address == address_of("second") and not second.connected)
