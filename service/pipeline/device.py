@@ -24,6 +24,8 @@ TWIN_WAIT_S = 300.0
 """Wait before a device is tried again that calls itself by the name of one which is connected."""
 TWIN_GRACE_S = 5.0
 """Once that one has been lost for so long, its twin is tried at once: it may be the same, under a new address."""
+FORGET_S = 1800.0
+"""An address that never told an id is kept for so long after it was last heard; private ones change every 15 min."""
 UNHEARD = "not heard since the service started"
 
 
@@ -61,7 +63,7 @@ class Device:
         self._standing = Standing(state=State.LOST if rssi_dbm is None else State.SEEN)
         self._fault: LinkFault | None = None
         """Why the last attempt failed or the last link was lost."""
-        self._moved_s = time.monotonic()
+        self._moved_s = self._heard_s = time.monotonic()
         self._told_s = 0.0
 
     @property
@@ -73,6 +75,11 @@ class Device:
     def is_provisional(self) -> bool:
         """Whether the device has not told its id yet."""
         return self.session.tracker.info.device is None
+
+    @property
+    def is_forgettable(self) -> bool:
+        """Whether it is but an address that has not been heard for long: a private one, changed since."""
+        return self.is_provisional and self.state in WAITING and time.monotonic() - self._heard_s >= FORGET_S
 
     @property
     def state(self) -> State:
@@ -113,6 +120,7 @@ class Device:
     def heard(self, name: str | None, rssi_dbm: int, *, tell_every_s: float) -> None:
         """Take an advertisement."""
         self.name, self.rssi_dbm = name or self.name, rssi_dbm
+        self._heard_s = time.monotonic()
         if time.monotonic() - self._told_s >= tell_every_s:
             self.describe()
 

@@ -58,6 +58,12 @@ class Roster:
         self._devices.append(device)
         self._at[device.address] = device
 
+    def forget(self) -> None:
+        """Let go of addresses that never told an id and are not heard any more, or there would be ever more."""
+        for device in [device for device in self._devices if device.is_forgettable]:
+            self._devices.remove(device)
+            del self._at[device.address]
+
     def owner(self, device: Device, told: str | None, make: Callable[[str], Device]) -> Device:
         """Return the device that a link to `device`'s address belongs to, now that it told its id.
 

@@ -122,6 +122,7 @@ class Supervisor:
         """Scan until a device is heard that should be connected now."""
         services = self._make_wearable().services
         while True:
+            self._roster.forget()
             async with scanning(services, self._backend, self._timeouts) as sightings:
                 self.trouble = None
                 with contextlib.suppress(TimeoutError):

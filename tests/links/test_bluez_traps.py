@@ -87,6 +87,7 @@ async def test_after_any_number_of_losses_each_notification_comes_once():
         assert all(clients == [] for clients in subscribers.of.values())
 
 
+@pytest.mark.full
 async def test_what_the_platform_calls_after_the_end_fills_no_queue():
     async with on_air(speed=8) as (_, sighting, backend), link_to(sighting, backend) as link:
         await taken(link, 3)

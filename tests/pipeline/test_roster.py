@@ -150,3 +150,18 @@ def test_a_loss_that_comes_after_the_end_changes_nothing():
     one.unwant()
     one.lost(LinkError(LinkFault.LOST, "late"))
     assert one.state is State.DISCONNECTED
+
+
+def test_an_address_that_never_told_its_id_is_forgotten(monkeypatch):
+    known, seen, heard, linked = made("A", device_id="left"), made("B"), made("C"), made("D")
+    table = roster(known, seen, heard, linked)
+    linked.move(Cause.ATTEMPT)
+    now = [seen._heard_s + device_module.FORGET_S - 1]
+    monkeypatch.setattr(device_module.time, "monotonic", lambda: now[0])
+    table.forget()
+    assert table.devices == [known, seen, heard, linked]
+    heard.heard(None, -60, tell_every_s=5)
+    now[0] += 2
+    table.forget()
+    assert table.devices == [known, heard, linked]
+    assert table.at("B") is None

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import time
 
 import pytest
 from pipeline.radio import on_radio, walking
@@ -82,6 +83,7 @@ async def test_a_second_bracelet_of_the_same_id_is_turned_away_and_waits():
             assert known.address == address_of("one")
 
 
+@pytest.mark.full
 async def test_a_disconnected_device_is_left_alone_under_its_new_address_too():
     body = walking("first", says="sim-1")
     async with on_radio() as radio:
@@ -110,8 +112,8 @@ class Log:
 
         class Scanner(inner.scanner):
             async def start(self):
-                await super().start()
                 log.append(("scan", None))
+                await super().start()
 
             async def stop(self):
                 await super().stop()
@@ -143,8 +145,9 @@ async def test_each_attempt_has_a_fresh_scan_result_alone_with_the_scanner_stopp
         bracelets = [await stack.enter_async_context(radio.air.bracelet(walking(f"sim-{n}"), **FAST)) for n in range(3)]
         for _ in range(3):
             for n, one in enumerate(bracelets):
-                await radio.streams(f"sim-{n}")
+                device = await radio.streams(f"sim-{n}")
                 await one.drop_link()
+                await radio.until(lambda device=device: device.state is not State.STREAMING)
         for n in range(3):
             await radio.streams(f"sim-{n}")
     fresh, scanning, dialling, dialled = set(), False, 0, []
@@ -184,6 +187,7 @@ async def test_stale_connections_of_remembered_devices_are_closed_first():
     assert closed == [("OLD", 0)]
 
 
+@pytest.mark.full
 async def test_states_are_told_in_a_legal_order():
     async with on_radio() as radio, radio.air.bracelet(walking(), **FAST) as gatt:
         for _ in range(2):
@@ -192,3 +196,18 @@ async def test_states_are_told_in_a_legal_order():
         await radio.streams()
         states = [notice.event.state for notice in radio.told if isinstance(notice.event, StateChanged)]
     assert states[:5] == ["connecting", "streaming", "lost", "connecting", "streaming"]
+
+
+@pytest.mark.full
+async def test_a_mute_peer_does_not_hold_up_a_disconnect():
+    async with on_radio() as radio, radio.air.bracelet(walking(), **FAST) as gatt:
+        gatt.silence()
+        device = await radio.until(lambda: next(iter(radio.supervisor.devices), None))
+        await radio.until(lambda: device.state is State.CONNECTING and gatt.connected)
+        await asyncio.sleep(0.1)
+        began = time.monotonic()
+        radio.supervisor.disconnect(device.id)
+        await radio.until(device.task.done)
+        assert time.monotonic() - began < 0.1
+        assert device.state is State.DISCONNECTED
+        await radio.until(lambda: not gatt.connected)
