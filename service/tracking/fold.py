@@ -8,7 +8,7 @@ goes on from it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from service.counters.contract import StepCounter
@@ -27,6 +27,7 @@ from service.samples import (
     Signal,
     Step,
     StepCounted,
+    Tentative,
     Update,
 )
 from service.signals.heading import WalkingDirection
@@ -160,6 +161,10 @@ class Fold:
         events.append(self._counting(pending))
         return events
 
+    def likely(self) -> list[Tentative]:
+        """Return the primary's steps that were told as likely and are still open."""
+        return self._placed(self.tentative.open.values())
+
     def change_counters(self, counters: Mapping[str, CounterFactory], *, primary: str) -> list[Event]:
         """Go on with other counters: equal ones as they are, the others afresh from the next sample on.
 
@@ -260,11 +265,13 @@ class Fold:
                 self._cadence.add(step.at_s)
         return events
 
-    def _follow(self, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Event]:
+    def _follow(self, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Tentative]:
         """Tell what the primary calls likely, and take back what it does no more."""
         told = self.tentative.follow(self.primary, self.boot or 0, likely, confirmed)
-        if not told:
-            return []
+        return self._placed(told) if told else []
+
+    def _placed(self, told: Iterable[Tentative]) -> list[Tentative]:
+        """Say how well the time of likely steps is known, and where they went."""
         uncertainty_s = self._uncertainty_s(self.primary)
         return [
             dataclasses.replace(event, uncertainty_s=uncertainty_s, heading=self._heading.at(event.at_s))
