@@ -114,6 +114,7 @@ class Intake:
         verdict = self._doubt.judge(block, boots=boots, awaited=awaited, rate_hz=rate_hz)
         self.tally.packets_bad += verdict.refused
         self.tally.packets_duplicate += verdict.repeated
+        self.tally.packets_reordered += verdict.overtaken
         believed: list[Believed] = []
         if verdict.restarted:
             believed.append(self._begin_boot(block.boot))

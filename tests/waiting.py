@@ -1,13 +1,12 @@
 """A device with history that is heard through a bad link, for the tests of what waits for samples."""
 
-import dataclasses
+import json
 from functools import partial
-from random import Random
 
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters import registry
-from service.samples import GRID_HZ, DeviceInfo, Packet, Reply, Sensor, Tentative, StepCounted
+from service.samples import GRID_HZ, DeviceInfo, Packet, Reply, Sensor, StepCounted, Tentative
 from service.tracking.backfill import BackfillTracker
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
@@ -71,10 +70,13 @@ class Device:
             width = 3 * len(sensors)
             self.counts += [block[i : i + width] for i in range(0, len(block), width)]
 
+    def __repr__(self):
+        return f"Device(boot={self.boot}, keeps={self.keeps})"
+
     def packet(self, index, n, *, history=False, base=0):
         """n samples from `index` on; the wire tells `base` more."""
         n = min(n, self.samples - index)
-        tick = wire.tick_index(index) * 1024 // GRID_HZ
+        tick = wire.tick_index(base + index) * 1024 // GRID_HZ
         told = wire.DataPacket(
             boot=self.boot,
             index=(base + index) % 2**32,
@@ -123,7 +125,7 @@ def ask(tracker, device, lose=lambda _: False, *, rounds=1000, slices=256):
 
 def fold_state(tracker):
     """All of a snapshot that the order of packets must not change."""
-    state = tracker.snapshot()
+    state = json.loads(json.dumps(tracker.snapshot()))
     return {key: value for key, value in state.items() if key not in {"tally", "intake"}}
 
 
@@ -151,3 +153,37 @@ def check_order(events, primary):
             told.remove(key)
             confirmed.add(key)
     return told
+
+
+def storm(device, rng, *, n=10, loss=0.0, burst=1, late=0, repeat=0.0, start=0):
+    """Live packets as they arrive through a bad link, as (index, packet); the first and the last six get through."""
+    indices = list(range(start, device.samples, n))
+    arriving, left = [], 0
+    for place, index in enumerate(indices):
+        if 0 < place < len(indices) - 6:
+            left = burst if not left and rng.random() < loss / burst else left
+            if left:
+                left -= 1
+                continue
+        at = place + (rng.random() * late if 0 < place < len(indices) - 6 else 0.0)
+        arriving.append((at, index))
+        if rng.random() < repeat:
+            arriving.append((at + rng.random() * 5, index))
+    return [(index, device.packet(index, n)) for _, index in sorted(arriving)]
+
+
+def heal(tracker, device, packets, rng, *, lose=0.0, slices=256, sizes=(28,)):
+    """Apply `packets`; what the tracker wants comes from history meanwhile, a packet for each live one, some lost."""
+    events, queue = [], []
+    for packet in packets:
+        events += run(tracker, [packet], slices=slices)
+        if (missing := tracker.wanted()) is not None:
+            tracker.ask(missing)
+            *sent, reply = device.history(missing, rng.choice(sizes))
+            rng.shuffle(sent)
+            queue += [*sent, *rng.sample(sent, len(sent) // 3), reply]
+        if queue:
+            arrived = queue.pop(0)
+            if arrived.characteristic == REPLY or rng.random() >= lose:
+                events += run(tracker, [arrived], slices=slices)
+    return events + run(tracker, queue, slices=slices) + ask(tracker, device, slices=slices)
