@@ -19,34 +19,17 @@ counting again is `catch_up`'s, in small slices, as long as it `has_work`.
 from __future__ import annotations
 
 import dataclasses
-from collections import deque
-from collections.abc import Iterable, Mapping
-from math import inf
+from collections.abc import Mapping
 from typing import Any, Final
 
 from service.errors import WireError
-from service.samples import (
-    Counting,
-    Described,
-    DeviceInfo,
-    Event,
-    Heard,
-    Packet,
-    RawBlock,
-    Received,
-    Reply,
-    Segmented,
-    Signal,
-    StepCounted,
-    Tentative,
-)
-from service.tracking.account import Account
-from service.tracking.awaiting import awaited, corrections
+from service.samples import Described, DeviceInfo, Event, Heard, Packet, RawBlock, Received, Reply
+from service.tracking.awaiting import awaited
+from service.tracking.behind import SLICE_SAMPLES, Behind
 from service.tracking.cutting import cut
 from service.tracking.doubt import REORDERING
 from service.tracking.fitness import Stream
 from service.tracking.fold import CounterFactory, Fold
-from service.tracking.holes import Span
 from service.tracking.intake import Booted, Intake, Said
 from service.tracking.kept import Kept
 from service.tracking.requests import Missing, Requests
@@ -57,17 +40,6 @@ AWAIT_S: Final = 900.0
 """Device time after which what is missing is lost."""
 LATE_S: Final = 10.0
 """A live packet older than this fills no hole: its index is rather broken."""
-SLICE_SAMPLES: Final = 256
-"""Samples that one call of `catch_up` counts at most, but for one chunk."""
-
-
-class _Build:
-    """A front in the making."""
-
-    def __init__(self, fold: Fold, closed: int) -> None:
-        self.fold, self.closed = fold, closed
-        self.serial = 0
-        self.sure: list[StepCounted] = []
 
 
 class BackfillTracker:
@@ -77,19 +49,8 @@ class BackfillTracker:
         self.tally = Tally()
         self._intake = Intake(wearable, self.tally)
         self._committed = Fold(counters, primary=primary, tally=self.tally)
-        self._kept: deque[Kept] = deque()
-        """What waits, run by run; empty where nothing is missing and the committed Tracker is the front."""
-        self._front: Fold | None = None
-        self._build: _Build | None = None
-        self._account = Account()
+        self._behind = Behind(self._committed, self.tally)
         self._requests = Requests()
-        self._forked_at: int | None = None
-        """Where the committed Tracker stood when the front was forked from it."""
-        self._passed = 0
-        """Packets that brought newer samples than all before."""
-        self._closed = 0
-        self._front_closed = 0
-        """Spans that were closed, and those of them that the front has counted closed."""
 
     @property
     def primary(self) -> str:
@@ -119,38 +80,32 @@ class BackfillTracker:
     @property
     def steps_now(self) -> int:
         """The device's steps with all that is likely, behind a hole too; may fall."""
-        committed, front = self._committed, self._front
-        if front is None:
-            return committed.steps_now
-        pending = front.steps_now - front.total
-        if committed.next_index == self._forked_at:
-            return committed.total + self._account.sure_after(-inf) + pending
-        return committed.steps_now + self._account.sure_after(committed.now_s) + pending
+        return self._behind.steps_now
 
     @property
     def now_s(self) -> float:
         """Device time of the newest sample counted, seconds after boot."""
-        return self._newest.now_s
+        return self._behind.front.now_s
 
     @property
     def cadence_spm(self) -> float | None:
         """Steps a minute now; None while nobody walks."""
-        return self._newest.cadence_spm
+        return self._behind.front.cadence_spm
 
     @property
     def measured_rate_hz(self) -> float | None:
         """The device's sampling rate as its own clock tells it."""
-        return self._newest.measured_rate_hz
+        return self._behind.front.measured_rate_hz
 
     @property
     def counter_faults(self) -> dict[str, str]:
         """Why a counter does not count now, as a sentence."""
-        return self._newest.counter_faults
+        return self._behind.front.counter_faults
 
     @property
     def stream(self) -> Stream:
         """What is known of what the device sends."""
-        return dataclasses.replace(self._newest.stream, has=self.info.sensors)
+        return dataclasses.replace(self._behind.front.stream, has=self.info.sensors)
 
     @property
     def cursor(self) -> tuple[int, int, int]:
@@ -161,10 +116,7 @@ class BackfillTracker:
     @property
     def has_work(self) -> bool:
         """Whether `catch_up` has something to do."""
-        if not self._kept:
-            return False
-        kept = self._kept[0]
-        return len(self._kept) > 1 or kept.is_ready or not kept.holes or self._is_stale or self._build is not None
+        return self._behind.has_work
 
     @property
     def asked(self) -> Missing | None:
@@ -191,22 +143,22 @@ class BackfillTracker:
         """Count on what can be counted for good, or make the front anew: about so many samples of it."""
         events: list[Event] = []
         while samples > 0 and self.has_work:
-            samples -= self._work(events)
+            samples -= self._behind.work(events)
         if events:
-            self._tally_awaited()
-            events.append(self._counting())
+            self._behind.tally_awaited()
+            events.append(self._behind.counting())
         return events
 
     def wanted(self) -> Missing | None:
         """Return what to ask the device for now; None while a request is under way or nothing is worth one."""
-        if not self._kept or not self.info.history_samples or self._requests.asked:
+        if not self._behind or not self.info.history_samples or self._requests.asked:
             return None
-        return self._requests.choose(self._kept[-1], self._passed - REORDERING)
+        return self._requests.choose(self._behind.kept[-1], self._behind.passed - REORDERING)
 
     def ask(self, missing: Missing) -> None:
         """Take note that the device was asked; its Reply comes with the packets."""
-        if self._kept:
-            self._requests.begin(missing, self._kept[-1])
+        if self._behind:
+            self._requests.begin(missing, self._behind.kept[-1])
 
     def unanswered(self) -> None:
         """Take note that no answer will come: the link is lost, or it took too long. It will be wanted again."""
@@ -214,32 +166,23 @@ class BackfillTracker:
 
     def change_counters(self, counters: Mapping[str, CounterFactory], *, primary: str) -> list[Event]:
         """Go on with other counters, as Fold.change_counters; where a hole is open, from the hole on."""
-        before = self.primary
-        told = self._committed.change_counters(counters, primary=primary)
-        if not self._kept:
-            return told
-        events = self._commit(told, before)
-        if any(isinstance(event, Segmented) for event in told):
-            events += self._account.retract()
-        if self._front is not None:
-            self._front.change_counters(counters, primary=primary)
-        self._build, self._front_closed = None, -1
-        return [*events, self._counting()]
+        where = self._behind or self._committed
+        return where.change_counters(counters, primary=primary)
 
     def finish(self) -> list[Event]:
         """End the stream: what is missing is lost; decide what is still pending."""
-        for kept in self._kept:
+        for kept in self._behind.kept:
             kept.lose_all()
         events: list[Event] = []
-        while self._kept:
+        while self._behind:
             events += self.catch_up()
         return events + self._committed.finish()
 
     def snapshot(self) -> dict[str, Any]:
         """Return the committed state as plain data."""
         tally = dataclasses.asdict(self.tally)
-        tally["samples"] -= sum(kept.samples for kept in self._kept)
-        tally["samples_saturated"] -= sum(kept.saturated for kept in self._kept)
+        tally["samples"] -= sum(kept.samples for kept in self._behind.kept)
+        tally["samples_saturated"] -= sum(kept.saturated for kept in self._behind.kept)
         tally["samples_awaited"] = 0
         return {**self._committed.snapshot(), "tally": tally, "intake": self._intake.snapshot()}
 
@@ -267,14 +210,6 @@ class BackfillTracker:
         said = self._intake.hear(characteristic, data)
         return [] if said is None else self._describe(said)
 
-    @property
-    def _newest(self) -> Fold:
-        return self._front or self._committed
-
-    @property
-    def _is_stale(self) -> bool:
-        return self._front is None or self._front_closed != self._closed
-
     def _heard(self, packet: Packet) -> Heard:
         intake = self._intake
         return Heard(
@@ -286,248 +221,100 @@ class BackfillTracker:
         )
 
     def _describe(self, said: Said) -> list[Event]:
-        if not self._kept:
+        if not self._behind:
             self._committed.describe(said.info)
         else:
-            self._kept[-1].say(said.info)
-            if self._front is not None:
-                self._front.describe(said.info)
+            self._behind.describe(said.info)
         return [Described(info=self.info)] if said.is_change else []
 
     def _boot(self, booted: Booted) -> list[Event]:
         """Begin a boot: at once where nothing waits, else when all that waits has been counted."""
         self._requests.end()
-        if not self._kept:
+        if not self._behind:
             return self._committed.begin_boot(booted.boot)
-        self._kept[-1].lose_all()
-        self._front = self._build = None
+        self._behind.end_run()
         return []
 
     def _receive(self, block: RawBlock, *, replayed: bool = False, is_lost: bool = False) -> list[Event]:
         """Take a believed block."""
-        if self._kept:
+        if self._behind:
             return self._receive_behind(block, replayed=replayed, is_lost=is_lost)
         committed = self._committed
         awaits = committed.next_index
         if awaits is None:
             awaits = self._first_of_boot(block)
         if block.index > awaits and not is_lost:
-            self._wait_from(awaits, block.boot)
+            self._behind.wait_from(awaits, block.boot)
             return self._receive_behind(block, replayed=replayed, is_lost=False)
         fresh = block if block.index >= awaits else cut(block, awaits, block.index + len(block))
         if fresh is None:
             self.tally.packets_duplicate += 1
             return []
-        self._passed += 1
-        self._tally_samples(fresh)
+        self._behind.passed += 1
+        self._behind.tally_samples(fresh)
         return [Received(run=committed.run, block=fresh), *committed.count(fresh)]
 
     def _receive_behind(self, block: RawBlock, *, replayed: bool, is_lost: bool) -> list[Event]:
         """Take a believed block while something is missing: what fills holes, and what is newer than all."""
         kept = self._kept_of(block)
-        late = self._fill(kept, block)
+        late = self._behind.fill(kept, block) if self._may_fill(kept, block) else []
         newest = kept.next_index
         fresh = cut(block, newest, block.index + len(block))
         events: list[Event] = [Received(run=kept.run, block=piece) for piece in late]
         self.tally.packets_duplicate += not late and fresh is None
         self.tally.packets_reordered += bool(late) and not block.history
         if fresh is not None:
-            self._tally_samples(fresh)
+            self._behind.tally_samples(fresh)
             events.append(Received(run=kept.run, block=fresh))
-            events += self._extend(kept, fresh, replayed=replayed)
+            events += self._behind.extend(kept, fresh, self._rate_hz, is_settled=replayed)
             if is_lost:
                 kept.holes.lose(newest, fresh.index)
-            self._passed += 1
         self._expire(kept)
-        events += awaited(kept, self._passed - REORDERING)
-        self._tally_awaited()
+        events += awaited(kept, self._behind.passed - REORDERING)
+        self._behind.tally_awaited()
         return events
 
-    def _fill(self, kept: Kept, block: RawBlock) -> list[RawBlock]:
-        """Keep what of a block fills holes, and return it."""
-        if not block.history and kept.next_index - block.index > LATE_S * (self.info.rate_hz or 1.0):
-            return []
-        end = block.index + len(block)
-        holes = [(hole.first, hole.end) for hole in kept.holes.within(block.index, end)]
-        late = [piece for first, last in holes if (piece := cut(block, first, last)) is not None]
-        for piece in late:
-            kept.add(piece)
-            self._tally_samples(piece)
-            self._closed += kept.holes.fill(piece.index, piece.index + len(piece))
-        return late
+    @property
+    def _rate_hz(self) -> float:
+        return self.info.rate_hz or 1.0  # no sample is believed before it is known
 
-    def _extend(self, kept: Kept, block: RawBlock, *, replayed: bool) -> list[Event]:
-        """Keep the newest samples, note the hole before them if there is one, and have the front count them."""
-        front, span = self._front, None
-        if block.index > kept.next_index:
-            rate_hz = self.info.rate_hz or 1.0
-            since = -inf if replayed else self._passed
-            span = Span(
-                first=kept.next_index,
-                end=block.index,
-                since=since,
-                from_s=max(0, kept.next_index - 1) / rate_hz,
-                to_s=block.index / rate_hz,
-            )
-            kept.holes.add(span)
-        kept.add(block)
-        if front is None:
-            return []
-        if span is not None and front.next_index is not None:
-            span.from_s = front.now_s
-        told = self._follow(front.count(block))
-        if span is not None:
-            span.to_s = max(span.from_s, front.now_s - (len(block) - 1) / (front.measured_rate_hz or 1.0))
-        return [*told, self._counting()]
+    def _may_fill(self, kept: Kept, block: RawBlock) -> bool:
+        return block.history or kept.next_index - block.index <= LATE_S * self._rate_hz
 
     def _first_of_boot(self, block: RawBlock) -> int:
         """Return which sample a boot begins with, whose first received ones `block` holds."""
         known = self._intake.run > 0 and block.index <= (self.info.history_samples or 0)
         return 0 if known else block.index
 
-    def _wait_from(self, index: int, boot: int) -> None:
-        """Begin to wait for samples from `index` on: the front goes on from the committed Tracker."""
-        committed = self._committed
-        self._kept.append(Kept(run=committed.run, boot=boot, first=index))
-        self._front, self._forked_at = committed.fork(), committed.next_index
-        self._front_closed = self._closed
-        self._account = Account(committed.likely())
-
     def _kept_of(self, block: RawBlock) -> Kept:
         """Return what is kept of the newest run, begun if it has not."""
-        if self._kept[-1].run != self._intake.run:
+        if self._behind.kept[-1].run != self._intake.run:
             first = self._first_of_boot(block)
-            self._kept.append(Kept(run=self._intake.run, boot=block.boot, first=first))
-        return self._kept[-1]
+            self._behind.kept.append(Kept(run=self._intake.run, boot=block.boot, first=first))
+        return self._behind.kept[-1]
 
     def _expire(self, kept: Kept) -> None:
         """Give up what cannot come any more."""
         if not kept.holes:
             return
         if not self.info.history_samples:
-            settled = self._passed - REORDERING
+            settled = self._behind.passed - REORDERING
             for span in [span for span in kept.holes.spans if span.holes and span.since < settled]:
-                self._closed += kept.holes.lose(span.first, span.end)
+                self._behind.lose(span.first, span.end)
             return
-        most = min(self.info.history_samples, round(AWAIT_S * (self.info.rate_hz or 1.0)))
+        most = min(self.info.history_samples, round(AWAIT_S * self._rate_hz))
         limit = kept.next_index - most
         if kept.holes.first < limit:
             first, end = self._requests.protected()
-            self._closed += kept.holes.lose(kept.holes.first, min(limit, first) if self.asked else limit)
+            self._behind.lose(kept.holes.first, min(limit, first) if self.asked else limit)
             if self.asked and kept.holes and end < limit:
-                self._closed += kept.holes.lose(end, limit)
+                self._behind.lose(end, limit)
 
     def _answered(self, reply: Reply) -> None:
-        if self._kept:
-            kept = self._kept[-1]
+        if self._behind:
+            kept = self._behind.kept[-1]
             for first, end in self._requests.answered(reply, kept):
-                self._closed += kept.holes.lose(first, end)
-            self._tally_awaited()
+                self._behind.lose(first, end)
+            self._behind.tally_awaited()
         else:
             self._requests.end()
-
-    def _work(self, events: list[Event]) -> int:
-        """Do the next piece of what is to be done; return about how many samples it was worth."""
-        kept = self._kept[0]
-        block = kept.ready()
-        if block is not None:
-            self._build = None
-            self._hear(kept, block.index)
-            events += self._commit(self._committed.count(block), self.primary)
-            kept.counted(block)
-            return len(block)
-        if len(self._kept) > 1:
-            self._next_boot(events)
-        elif not kept.holes:
-            self._promote(kept, events)
-        else:
-            return self._rebuild(kept, events)
-        return SLICE_SAMPLES
-
-    def _hear(self, kept: Kept, index: int) -> None:
-        """Let the committed Tracker know what the device said up to sample `index`."""
-        for serial, said in kept.said(index, 0):
-            self._committed.describe(said)
-            kept.heeded(serial)
-
-    def _next_boot(self, events: list[Event]) -> None:
-        """End a boot of which all was counted, and begin the next."""
-        kept = self._kept.popleft()
-        self._hear(kept, kept.next_index)
-        now_s = self._committed.now_s
-        *last, rebooted = self._committed.begin_boot(self._kept[0].boot)
-        events += self._commit(last, self.primary)
-        events += self._account.retract()
-        events += corrections(kept, self._account, now_s)
-        events.append(rebooted)
-        self._account = Account()
-
-    def _promote(self, kept: Kept, events: list[Event]) -> None:
-        """Nothing is missing any more: the committed Tracker is the front."""
-        self._hear(kept, kept.next_index)
-        events += self._account.settle(self._committed.likely(), ())
-        events += corrections(kept, self._account, self._committed.now_s)
-        self._kept.clear()
-        self._front = self._build = None
-
-    def _rebuild(self, kept: Kept, events: list[Event]) -> int:
-        """Make another front, from the committed Tracker and what was received behind it."""
-        if self._build is None:
-            self._build = _Build(self._committed.fork(), self._closed)
-            return SLICE_SAMPLES
-        build = self._build
-        block = kept.after(build.fold.next_index or 0)
-        said = kept.said(kept.next_index if block is None else block.index, build.serial)
-        for build.serial, what in said:
-            build.fold.describe(what)
-        if block is None:
-            self._replace_front(kept, build, events)
-            return SLICE_SAMPLES
-        for event in build.fold.count(block):
-            if isinstance(event, StepCounted) and event.counter == self.primary:
-                build.sure.append(event)
-        return len(block)
-
-    def _replace_front(self, kept: Kept, build: _Build, events: list[Event]) -> None:
-        self._front, self._front_closed, self._build = build.fold, build.closed, None
-        self._forked_at = self._committed.next_index
-        events += self._account.settle(build.fold.likely(), build.sure)
-        events += corrections(kept, self._account, build.fold.now_s)
-
-    def _follow(self, told: Iterable[Event]) -> list[Event]:
-        """Return what is to be told of what the front tells."""
-        events: list[Event] = []
-        for event in told:
-            if isinstance(event, Tentative):
-                events += self._account.follow(event)
-            elif isinstance(event, StepCounted) and event.counter == self.primary:
-                self._account.assume(event)
-            elif isinstance(event, Signal):
-                events.append(event)
-        return events
-
-    def _commit(self, told: Iterable[Event], primary: str) -> list[Event]:
-        """Return what is to be told of what the committed Tracker tells while another is the front."""
-        events: list[Event] = []
-        for event in told:
-            if isinstance(event, StepCounted) and event.counter == primary:
-                events += self._account.confirm(event)
-            elif not isinstance(event, (Tentative, Signal, Counting)):
-                events.append(event)
-        return events
-
-    def _counting(self) -> Counting:
-        return Counting(now_s=self.now_s, steps=self.total, steps_now=self.steps_now, cadence_spm=self.cadence_spm)
-
-    def _tally_samples(self, block: RawBlock) -> None:
-        self.tally.samples += len(block)
-        self.tally.samples_saturated += len(block.saturated)
-
-    def _tally_awaited(self) -> None:
-        """Count what is missing and not yet told as lost."""
-        awaited, counted = 0, self._committed.next_index
-        for kept in self._kept:
-            first = kept.first if counted is None else counted
-            awaited += kept.next_index - first - kept.samples
-            counted = None
-        self.tally.samples_awaited = awaited

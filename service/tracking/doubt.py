@@ -2,8 +2,9 @@
 
 A packet that claims another boot, or samples further ahead than a hole that is interpolated, is held until another one
 bears it out: by lying near it, or by being believed and leading up to it. Otherwise it is refused. And packets that go
-on from each other for RESTART_S and longer than a reordering, all of them older than what is awaited, come from a device
-that has started again without a new boot number. What is sent again from history is judged apart: it can be neither ahead nor a restart.
+on from each other for RESTART_S and longer than a reordering, all of them older than what is awaited, come from a
+device that has started again without a new boot number. What is sent again from history is judged apart: it can be
+neither ahead nor a restart.
 """
 
 from __future__ import annotations
