@@ -124,8 +124,10 @@ def ask(tracker, device, lose=lambda _: False, *, rounds=1000, slices=256):
 
 
 def fold_state(tracker):
-    """All of a snapshot that the order of packets must not change."""
+    """All of a snapshot that the order of packets must not change; a likely step's strength is as it was first told."""
     state = json.loads(json.dumps(tracker.snapshot()))
+    told, confirmed_s = state["tentative"]
+    state["tentative"] = [at_s for _, _, at_s, _, _ in told], confirmed_s
     return {key: value for key, value in state.items() if key not in {"tally", "intake"}}
 
 

@@ -151,7 +151,7 @@ class BackfillTracker:
 
     def wanted(self) -> Missing | None:
         """Return what to ask the device for now; None while a request is under way or nothing is worth one."""
-        if not self._behind or not self.info.history_samples or self._requests.asked:
+        if not self._behind or not self._keeps or self._requests.asked:
             return None
         return self._requests.choose(self._behind.kept[-1], self._behind.passed - REORDERING)
 
@@ -266,13 +266,19 @@ class BackfillTracker:
         if fresh is not None:
             self._behind.tally_samples(fresh)
             events.append(Received(run=kept.run, block=fresh))
-            events += self._behind.extend(kept, fresh, self._rate_hz, is_settled=replayed)
+            events += self._behind.extend(kept, fresh, self._rate_hz, is_settled=replayed and self._keeps)
             if is_lost:
                 kept.holes.lose(newest, fresh.index)
         self._expire(kept)
-        events += awaited(kept, self._behind.passed - REORDERING)
+        if len(self._behind.kept) == 1:  # else its boot has not been told yet
+            events += awaited(kept, self._behind.passed - REORDERING)
         self._behind.tally_awaited()
         return events
+
+    @property
+    def _keeps(self) -> bool:
+        """Whether the device can send samples again."""
+        return bool(self.info.history_samples)
 
     @property
     def _rate_hz(self) -> float:
@@ -297,12 +303,12 @@ class BackfillTracker:
         """Give up what cannot come any more."""
         if not kept.holes:
             return
-        if not self.info.history_samples:
+        if not self._keeps:
             settled = self._behind.passed - REORDERING
             for span in [span for span in kept.holes.spans if span.holes and span.since < settled]:
                 self._behind.lose(span.first, span.end)
             return
-        most = min(self.info.history_samples, round(AWAIT_S * self._rate_hz))
+        most = min(self.info.history_samples or 0, round(AWAIT_S * self._rate_hz))
         limit = kept.next_index - most
         if kept.holes.first < limit:
             first, end = self._requests.protected()

@@ -21,7 +21,7 @@ from service.tracking.holes import Span
 from service.tracking.kept import Kept
 from service.tracking.tally import Tally
 
-SLICE_SAMPLES: Final = 256
+SLICE_SAMPLES: Final = 128
 """Samples that are counted again at a time, at most but for one chunk; a fork takes about as long."""
 
 

@@ -424,7 +424,7 @@ def test_grid_samples_come_in_order_and_once(device):
 @settings(max_examples=3)
 @given(seed=SEEDS, loss=st.sampled_from([0.05, 0.2]))
 def test_with_history_every_counter_is_as_without_loss(seed, loss):
-    names = [PRIMARY, *(name for name in registry.names() if name != PRIMARY)]
+    names = [PRIMARY, *(name for name in registry.COUNTERS if name != PRIMARY)]
     device = Device(60, sensors=tuple(Sensor))
     reference = plain(names)
     expected = run(reference, [*device.said, *device.live()])
