@@ -3,9 +3,12 @@
 import json
 from functools import partial
 
+import numpy as np
+
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters import registry
+from service.recordings import read
 from service.samples import GRID_HZ, DeviceInfo, Packet, Reply, Sensor, StepCounted, Tentative
 from service.tracking.backfill import BackfillTracker
 from service.tracking.tracker import Tracker
@@ -49,7 +52,7 @@ class Device:
     def __init__(self, seconds=60, *, script=None, seed=3, sensors=(Sensor.ACCELEROMETER,), keeps=30_000, boot=1):
         part = script or "normal:9,rest:2,run:8,slow:7"
         bracelet = Bracelet(Walker(",".join([part] * (seconds // 20 + 1)), seed=seed, sensors=sensors))
-        self.sensors, self.boot, self.keeps = sensors, boot, keeps
+        self.sensors, self.boot, self.keeps, self.rate_hz = sensors, boot, keeps, float(GRID_HZ)
         said = {
             wire.BOOT: wire.encode_boot(boot),
             wire.SENSORS: bracelet.sensors_value(),
@@ -70,13 +73,25 @@ class Device:
             width = 3 * len(sensors)
             self.counts += [block[i : i + width] for i in range(0, len(block), width)]
 
+    @classmethod
+    def of(cls, path, *, keeps=30_000):
+        """A device that measured a recording, as far as it is evenly spaced."""
+        recording = read(path)
+        made = cls(0, keeps=keeps)
+        made.rate_hz = round(recording.rate_hz, 2)
+        made.counts = np.rint(recording.acc_g * 4096).astype(int).tolist()
+        made.samples = len(made.counts)
+        made.said = [p for p in made.said if p.characteristic != wire.RATE]
+        made.said.append(Packet(characteristic=wire.RATE, data=wire.encode_rate(made.rate_hz), at_ns=0))
+        return made
+
     def __repr__(self):
         return f"Device(boot={self.boot}, keeps={self.keeps})"
 
     def packet(self, index, n, *, history=False, base=0):
         """n samples from `index` on; the wire tells `base` more."""
         n = min(n, self.samples - index)
-        tick = wire.tick_index(base + index) * 1024 // GRID_HZ
+        tick = int(wire.tick_index(base + index) * 1024 / self.rate_hz)
         told = wire.DataPacket(
             boot=self.boot,
             index=(base + index) % 2**32,

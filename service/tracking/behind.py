@@ -21,8 +21,8 @@ from service.tracking.holes import Span
 from service.tracking.kept import Kept
 from service.tracking.tally import Tally
 
-SLICE_SAMPLES: Final = 128
-"""Samples that are counted again at a time, at most but for one chunk; a fork takes about as long."""
+SLICE_SAMPLES: Final = 100
+"""Samples that are counted again at a time, and then to the end of a chunk; a fork takes about as long."""
 
 
 class _Build:

@@ -22,9 +22,11 @@ CHUNK_SAMPLES: Final = TICK_EVERY
 class Chunk:
     """Consecutive samples that hold the same sensors."""
 
-    __slots__ = ("_columns", "_saturated", "boot", "index", "tick")
+    __slots__ = ("_columns", "_is_first", "_saturated", "boot", "index", "tick")
 
-    def __init__(self, block: RawBlock) -> None:
+    def __init__(self, block: RawBlock, *, is_first: bool) -> None:
+        self._is_first = is_first
+        """Whether it follows a hole: a tick that comes with the first samples of another stretch is not heeded."""
         self.boot, self.index, self.tick = block.boot, block.index, block.tick
         self._columns = [None if c is None else tuple(array("d", one) for one in c) for c in _columns(block)]
         self._saturated = list(block.saturated)
@@ -66,7 +68,8 @@ class Chunk:
 
     def _tells(self, stretch: int) -> bool:
         """Whether it tells the tick of a stretch to whoever counts it: it has to begin inside of it."""
-        return self.tick is not None and self.index % TICK_EVERY != 0 and self.index // TICK_EVERY == stretch
+        heeded = not self._is_first and self.index % TICK_EVERY != 0
+        return heeded and self.tick is not None and self.index // TICK_EVERY == stretch
 
 
 class Kept:
@@ -91,8 +94,9 @@ class Kept:
         self.next_index = max(self.next_index, block.index + len(block))
         at = bisect_left(self._chunks, block.index, key=lambda chunk: chunk.index)
         parted = any(index == block.index for index, _, _ in self._said)
-        if at == 0 or parted or not self._chunks[at - 1].join(block):
-            self._chunks.insert(at, Chunk(block))
+        is_first = at == 0 or self._chunks[at - 1].end != block.index
+        if is_first or parted or not self._chunks[at - 1].join(block):
+            self._chunks.insert(at, Chunk(block, is_first=is_first))
 
     def say(self, said: DeviceInfo) -> None:
         """Keep what the device says behind its newest sample."""
