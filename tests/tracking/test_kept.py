@@ -1,4 +1,4 @@
-"""What is kept behind a hole comes out as it went in: the same samples, and every tick that a fold would have heeded."""
+"""What is kept behind a hole comes out as it went in: the same samples, and every tick that a fold would heed."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
