@@ -9,7 +9,7 @@ from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters import registry
 from service.recordings import read
-from service.samples import GRID_HZ, DeviceInfo, Packet, Reply, Sensor, StepCounted, Tentative
+from service.samples import GRID_HZ, DeviceInfo, Packet, Rebooted, Reply, Sensor, StepCounted, Tentative
 from service.tracking.backfill import BackfillTracker
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
@@ -155,7 +155,10 @@ def check_order(events, primary):
     told = set()
     confirmed = set()
     for event in events:
-        if isinstance(event, Tentative):
+        if isinstance(event, Rebooted):  # perhaps with the same boot number
+            assert not told
+            confirmed.clear()
+        elif isinstance(event, Tentative):
             key = event.counter, event.boot, event.at_s
             if event.retracted:
                 assert key in told
