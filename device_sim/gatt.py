@@ -1,7 +1,8 @@
-"""The bracelet on the air: measures as time passes, notifies whoever subscribed, and fails on request.
+"""The bracelet on the air: measures as time passes, notifies whoever asked for it, and fails on request.
 
-Time goes on whether anybody listens or not, and while the air is away; what nobody takes is lost. Samples are paced
-against the loop's clock, so nothing drifts: after a pause, what has fallen due meanwhile is measured at once.
+Time goes on whether anybody listens or not, and while the air is away; what nobody takes stays in the ring. Samples are
+paced against the loop's clock, so nothing drifts but what the bracelet's own clock does: after a pause, what has fallen
+due meanwhile is measured at once. Of samples that are sent again, one packet goes after all that is live.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from service.errors import LinkError, ParameterError
 
 REOPEN_S: Final = 0.5
 """How long a bracelet waits before it looks for a lost air again."""
+MUTE_POLL_S: Final = 0.05
+"""How often a silenced bracelet looks whether it may go on with a report."""
 TURN_SAMPLES: Final = 5000
 """What is measured at once at most: a speed beyond the machine's lags, and does not block it."""
 
@@ -36,9 +39,10 @@ class Start(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GattStatistics:
-    """Packets since power-on (`packets` taken by a host), links made, and what became of the samples."""
+    """Packets since power-on that a host took, live and sent again; links made; and what became of the samples."""
 
     packets: int
+    packets_again: int
     links: int
     measured: int
     sent: int
@@ -52,8 +56,8 @@ class GattBracelet:
 
     `speed` is device seconds per second; `math.inf` plays as fast as the subscriber takes it, and stands still while
     there is none. `name` has at most 8 bytes, `max_mtu` is the largest ATT MTU agreed to (23…517). `played` is set once
-    a finite source has been played to its end. `distort` maps an outgoing packet to those that are sent instead: none
-    loses it, two duplicate it.
+    a finite source has been played to its end. `distort` maps an outgoing live packet to those that are sent instead:
+    none loses it, as a firmware does whose queue is full, two duplicate it. A report waits for the radio.
     """
 
     def __init__(
@@ -82,9 +86,12 @@ class GattBracelet:
         self._peripheral: Peripheral | None = None
         self._away = self._muted = False
         self._corrupt = 0
-        self._packets = 0
+        self._packets = self._packets_again = 0
         self._links_before = 0
         self._listened = asyncio.Event()
+        """Set when a host begins to take live samples."""
+        self._asked = asyncio.Event()
+        """Set while a host may wait for a report."""
         self._attached = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
@@ -117,7 +124,9 @@ class GattBracelet:
     def statistics(self) -> GattStatistics:
         """Return counts since power-on."""
         links = self._links_before + (self._peripheral.links_made if self._peripheral else 0)
-        return GattStatistics(packets=self._packets, links=links, **asdict(self.bracelet.statistics()))
+        return GattStatistics(
+            packets=self._packets, packets_again=self._packets_again, links=links, **asdict(self.bracelet.statistics())
+        )
 
     async def until_played(self) -> None:
         """Wait until a finite source has been played; raise what ended the bracelet before that."""
@@ -188,6 +197,7 @@ class GattBracelet:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._stay_on_air())
             tasks.create_task(self._play())
+            tasks.create_task(self._report())
 
     async def _stop(self) -> None:
         task, self._task = self._task, None
@@ -222,11 +232,30 @@ class GattBracelet:
 
     def _power_on(self, transport: Transport) -> Peripheral:
         peripheral = Peripheral(
-            transport, self.bracelet, name=self._name, max_mtu=self._max_mtu, on_subscribed=self._listened.set
+            transport, self.bracelet, name=self._name, max_mtu=self._max_mtu, on_asked=self._on_asked
         )
         peripheral.muted, peripheral.away = self._muted, self._away
         self._peripheral = peripheral
         return peripheral
+
+    def _on_asked(self) -> None:
+        if self.subscribed:
+            self._listened.set()
+        self._asked.set()
+
+    async def _report(self) -> None:
+        """Send again what a host asks for, live packets going first."""
+        while True:
+            await self._asked.wait()
+            peripheral = self._peripheral
+            if peripheral is None or not peripheral.control.reporting:
+                self._asked.clear()
+            elif self._muted:
+                await asyncio.sleep(MUTE_POLL_S)
+            else:
+                await self._send()
+                self._packets_again += await peripheral.report()
+                await asyncio.sleep(0)
 
     async def _play(self) -> None:
         if self._start is Start.ON_SUBSCRIBE:
@@ -236,15 +265,20 @@ class GattBracelet:
 
     async def _play_paced(self) -> None:
         loop = asyncio.get_running_loop()
-        began = loop.time()
-        rate_hz = self.bracelet.rate_hz * self._speed
-        measured = 0
+        began, rate_hz, measured = loop.time(), self._paced_hz, 0
         while not self.bracelet.ended:
+            if rate_hz != self._paced_hz:
+                began, rate_hz, measured = loop.time(), self._paced_hz, 0
             due = int((loop.time() - began) * rate_hz + 1e-6)
             measured += self.bracelet.measure(min(due - measured, TURN_SAMPLES))
             await self._send()
             full = measured + max(1, self.bracelet.wanting(self._mtu))
             await asyncio.sleep(max(0.0, began + full / rate_hz - loop.time()))
+
+    @property
+    def _paced_hz(self) -> float:
+        """Samples a second of the loop's clock."""
+        return self.bracelet.true_rate_hz * self._speed
 
     async def _play_flat_out(self) -> None:
         while not self.bracelet.ended:

@@ -1,0 +1,76 @@
+"""The bracelet's GATT table: its services, and who answers a read or a write of each characteristic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from bumble import att
+from bumble.gatt import Characteristic, CharacteristicValue, Service
+
+from device_sim.bracelet import Bracelet
+from service.samples import ACCELEROMETER_ONLY
+from service.wearables import bracelet as wire
+
+_P = Characteristic.Properties
+_SIG: Final = "-0000-1000-8000-00805f9b34fb"
+
+Asked = Callable[[object, bytes], None]
+"""Takes who wrote, and what; raises an ATT_Error where it is refused."""
+
+
+class Table:
+    """What a bracelet serves; `on_request` takes the writes of its control point."""
+
+    def __init__(self, bracelet: Bracelet, on_request: Asked) -> None:
+        self._bracelet = bracelet
+        self.data = _characteristic(wire.DATA, _P.NOTIFY)
+        self.control = _characteristic(wire.CONTROL, _P.WRITE | _P.INDICATE, write=on_request)
+        self.register = _characteristic(wire.REGISTER, _P.READ | _P.NOTIFY, bracelet.register_value)
+        self.battery = _characteristic(wire.BATTERY_LEVEL, _P.READ | _P.NOTIFY, bracelet.battery_value)
+        self.services = [self._own(), Service("180F", [self.battery]), self._about()]
+
+    def _own(self) -> Service:
+        bracelet = self._bracelet
+        values = {
+            wire.SCALE: bracelet.scale_value,
+            wire.RATE: bracelet.rate_value,
+            wire.BOOT: bracelet.boot_value,
+            wire.DEVICE_ID: bracelet.device_id_value,
+            wire.CLOCK: bracelet.clock_value,
+        }
+        # As old firmware has it: who measures acceleration only need not say so.
+        if bracelet.sensors != ACCELEROMETER_ONLY:
+            values[wire.SENSORS] = bracelet.sensors_value
+        if bracelet.control:
+            values |= {wire.HISTORY: bracelet.history_value, wire.UTC: bracelet.utc_value}
+        read = [_characteristic(uuid, _P.READ, value) for uuid, value in values.items()]
+        more = [self.control, self.register] if bracelet.control else []
+        return Service(wire.SERVICE, [self.data, *more, *read])
+
+    def _about(self) -> Service:
+        texts = {
+            wire.MANUFACTURER_NAME: self._bracelet.manufacturer,
+            wire.MODEL_NUMBER: self._bracelet.model,
+            wire.FIRMWARE_REVISION: self._bracelet.firmware,
+        }
+        return Service("180A", [_characteristic(uuid, _P.READ, text.encode) for uuid, text in texts.items()])
+
+
+def _characteristic(
+    uuid: str, properties: _P, value: Callable[[], bytes] | None = None, *, write: Asked | None = None
+) -> Characteristic[bytes]:
+    """Return a characteristic that refuses what it does not offer; bumble would leave a refused write unanswered."""
+
+    def read(_connection: object) -> bytes:
+        if value is None:
+            raise att.ATT_Error(att.ErrorCode.READ_NOT_PERMITTED)
+        return value()
+
+    def refuse(_connection: object, _value: bytes) -> None:
+        raise att.ATT_Error(att.ErrorCode.WRITE_NOT_PERMITTED)
+
+    short = uuid[4:8] if uuid.endswith(_SIG) else uuid
+    return Characteristic(
+        short, properties, Characteristic.READABLE, CharacteristicValue(read=read, write=write or refuse)
+    )
