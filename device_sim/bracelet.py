@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from device_sim.battery import Battery
 from device_sim.rated import Rated
 from device_sim.ring import Counts, Ring
 from device_sim.source import Samples, Source
@@ -79,10 +80,11 @@ class BraceletStatistics:
 class Bracelet:
     """A bracelet's state.
 
-    `source` gives the samples; `packet_samples` is the most a live packet holds (0: as many as the MTU); `boot` is the
-    number of the first boot and `index` that of its first sample (u32, for a test of the wrap). It keeps `history_s`
-    seconds (0: none). `utc_ms` is what its own clock says at power-on, None where that is not set. Without `control`
-    it is one of the first firmware: no control point, no history, no register.
+    `source` gives the samples; its battery lasts `battery_hours` (None: for ever). `packet_samples` is the most a live
+    packet holds (0: as many as the MTU); `boot` is the number of the first boot and `index` that of its first sample
+    (u32, for a test of the wrap). It keeps `history_s` seconds (0: none). `utc_ms` is what its own clock says at
+    power-on, None where that is not set. Without `control` it is one of the first firmware: no control point, no
+    history, no register.
     """
 
     manufacturer = "steplink"
@@ -99,6 +101,7 @@ class Bracelet:
         lsb_per_g: int = DEFAULT_LSB_PER_G,
         packet_samples: int = PACKET_SAMPLES,
         battery_percent: int = 100,
+        battery_hours: float | None = None,
         history_s: float = HISTORY_S,
         drift_ppm: float = 0.0,
         sensor_ppm: float = 0.0,
@@ -121,7 +124,7 @@ class Bracelet:
         self.boot = boot
         self.lsb_per_g = lsb_per_g
         self.packet_samples = packet_samples
-        self.battery_percent = battery_percent
+        self.battery = Battery(battery_percent, battery_hours)
         self.control = control
         self.ended = False
         self._source = Rated(source)
@@ -150,6 +153,11 @@ class Bracelet:
         return self._source.sensors
 
     @property
+    def steps(self) -> int:
+        """What its step register shows."""
+        return self._register.steps
+
+    @property
     def history_samples(self) -> int:
         """How many of its newest samples it keeps."""
         return round(self._history_s * self.rate_hz)
@@ -160,6 +168,7 @@ class Bracelet:
         counts = quantise(values, self._lsb)
         self._saturated += int((np.abs(values * self._lsb - counts) > 1).any(axis=1).sum())
         self._register.take(values)
+        self.battery.run(len(counts) / self.rate_hz)
         self._measured += len(counts)
         self._lost += self._ring.append(counts.astype(np.int16))
         self._live = max(self._live, self._ring.next - BUFFER_SAMPLES)
@@ -321,7 +330,7 @@ class Bracelet:
 
     def battery_value(self) -> bytes:
         """Return the charge in percent."""
-        return bytes([self.battery_percent])
+        return bytes([self.battery.percent])
 
     def _packet_size(self, mtu: int) -> int:
         fits = samples_per_packet(mtu, self.sensors)

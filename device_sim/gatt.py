@@ -24,6 +24,8 @@ from service.errors import LinkError, ParameterError
 
 REOPEN_S: Final = 0.5
 """How long a bracelet waits before it looks for a lost air again."""
+REGISTER_EVERY: Final = 4
+"""Steps after which the register is notified anew: about every two seconds of a walk."""
 MUTE_POLL_S: Final = 0.05
 """How often a silenced bracelet looks whether it may go on with a report."""
 TURN_SAMPLES: Final = 5000
@@ -93,6 +95,10 @@ class GattBracelet:
         self._asked = asyncio.Event()
         """Set while a host may wait for a report."""
         self._attached = asyncio.Event()
+        self._charged = asyncio.Event()
+        self._charged.set()
+        self._told = (bracelet.battery.percent, 0)
+        """Charge and step register that subscribers know."""
         self._task: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
@@ -141,10 +147,12 @@ class GattBracelet:
             raise _first(error)
 
     async def set_battery(self, percent: int) -> None:
-        """Set the charge (0…100 %) and notify it."""
-        self.bracelet.battery_percent = percent
-        if self._peripheral is not None:
-            await self._peripheral.notify_battery()
+        """Set the charge (0…100 %) and notify it; one that was flat starts again."""
+        self.bracelet.battery.charge(percent)
+        await self._tell_state()
+        if percent and not self._charged.is_set():
+            self._charged.set()
+            await self.come_back()
 
     # Faults, each as the wearer or the air would cause it.
 
@@ -272,6 +280,10 @@ class GattBracelet:
             due = int((loop.time() - began) * rate_hz + 1e-6)
             measured += self.bracelet.measure(min(due - measured, TURN_SAMPLES))
             await self._send()
+            await self._tell_state()
+            if not self._charged.is_set():
+                await self._charged.wait()
+                began, measured = loop.time(), 0
             full = measured + max(1, self.bracelet.wanting(self._mtu))
             await asyncio.sleep(max(0.0, began + full / rate_hz - loop.time()))
 
@@ -288,7 +300,23 @@ class GattBracelet:
                 continue
             self.bracelet.measure(self.bracelet.wanting(self._mtu))
             await self._send()
+            await self._tell_state()
+            await self._charged.wait()
             await asyncio.sleep(0)
+
+    async def _tell_state(self) -> None:
+        """Notify charge and register where they have changed; with an empty battery leave the air, and all is lost."""
+        bracelet = self.bracelet
+        before, self._told = self._told, (bracelet.battery.percent, bracelet.steps // REGISTER_EVERY)
+        if self._peripheral is not None:
+            if self._told[0] != before[0]:
+                await self._peripheral.notify_battery()
+            if self._told[1] != before[1]:
+                await self._peripheral.notify_register()
+        if not bracelet.battery.percent and self._charged.is_set():
+            self._charged.clear()
+            bracelet.reset()
+            await self.go_away()
 
     @property
     def _mtu(self) -> int:

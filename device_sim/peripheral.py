@@ -184,6 +184,11 @@ class Peripheral:
         if self._link is not None and not self.muted:
             await self.device.gatt_server.notify_subscriber(self._link, self._table.battery)
 
+    async def notify_register(self) -> None:
+        """Send the step register to whoever subscribed to it."""
+        if self._link is not None and not self.muted:
+            await self.device.gatt_server.notify_subscriber(self._link, self._table.register)
+
     async def drop(self, reason: int = hci.HCI_ErrorCode.CONNECTION_TIMEOUT_ERROR) -> None:
         """End the link, by default as if it had been out of range; return when it has ended."""
         link = self._link

@@ -54,7 +54,7 @@ class Rated:
 
     def read(self, n: int) -> Samples:
         """Return the next n samples; fewer at the end, then none."""
-        if self._step == 1 and not len(self._held):
+        if self._step == 1 and not len(self._held) and self._held_from == self._origin + self._made:
             samples = self._source.read(n)
             self._made += len(samples)
             self._held_from += len(samples)

@@ -219,6 +219,10 @@ def _bracelet(options: argparse.Namespace, device: str, *, mirrored: bool = Fals
         device_id=device,
         boot=time.time_ns() // BOOT_NS & 0xFFFFFFFF,
         packet_samples=options.packet_samples,
+        history_s=options.history_s,
+        drift_ppm=options.drift_ppm,
+        sensor_ppm=options.sensor_ppm,
+        battery_hours=options.battery_hours,
     )
 
 
