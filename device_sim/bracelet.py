@@ -158,6 +158,11 @@ class Bracelet:
         return self._register.steps
 
     @property
+    def now_s(self) -> float:
+        """Time by its oscillator since boot."""
+        return float(self._ring.next / self._ticking)
+
+    @property
     def history_samples(self) -> int:
         """How many of its newest samples it keeps."""
         return round(self._history_s * self.rate_hz)

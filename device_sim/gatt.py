@@ -19,13 +19,17 @@ from bumble.transport.common import Transport
 
 from device_sim.bracelet import Bracelet
 from device_sim.controller import Air
+from device_sim.pace import Pace
 from device_sim.peripheral import DEFAULT_MTU, Peripheral, advertisement
 from service.errors import LinkError, ParameterError
+from service.wearables import rsc
 
 REOPEN_S: Final = 0.5
 """How long a bracelet waits before it looks for a lost air again."""
 REGISTER_EVERY: Final = 4
 """Steps after which the register is notified anew: about every two seconds of a walk."""
+PACE_EVERY_S: Final = 1.0
+"""How often running speed and cadence are told."""
 MUTE_POLL_S: Final = 0.05
 """How often a silenced bracelet looks whether it may go on with a report."""
 TURN_SAMPLES: Final = 5000
@@ -99,6 +103,7 @@ class GattBracelet:
         self._charged.set()
         self._told = (bracelet.battery.percent, 0)
         """Charge and step register that subscribers know."""
+        self._pace, self._paced_s = Pace(), 0.0
         self._task: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
@@ -313,10 +318,21 @@ class GattBracelet:
                 await self._peripheral.notify_battery()
             if self._told[1] != before[1]:
                 await self._peripheral.notify_register()
+        await self._tell_pace()
         if not bracelet.battery.percent and self._charged.is_set():
             self._charged.clear()
             bracelet.reset()
             await self.go_away()
+
+    async def _tell_pace(self) -> None:
+        """Notify running speed and cadence, once a second of device time."""
+        now_s = self.bracelet.now_s
+        if 0 <= now_s - self._paced_s < PACE_EVERY_S:
+            return
+        self._paced_s = now_s
+        self._pace.take(now_s, self.bracelet.steps)
+        if self._peripheral is not None and self.bracelet.control:
+            await self._peripheral.notify_pace(rsc.encode(self._pace.measurement()))
 
     @property
     def _mtu(self) -> int:

@@ -11,6 +11,7 @@ from bumble.gatt import Characteristic, CharacteristicValue, Service
 from device_sim.bracelet import Bracelet
 from service.samples import ACCELEROMETER_ONLY
 from service.wearables import bracelet as wire
+from service.wearables import rsc
 
 _P = Characteristic.Properties
 _SIG: Final = "-0000-1000-8000-00805f9b34fb"
@@ -28,7 +29,11 @@ class Table:
         self.control = _characteristic(wire.CONTROL, _P.WRITE | _P.INDICATE, write=on_request)
         self.register = _characteristic(wire.REGISTER, _P.READ | _P.NOTIFY, bracelet.register_value)
         self.battery = _characteristic(wire.BATTERY_LEVEL, _P.READ | _P.NOTIFY, bracelet.battery_value)
+        self.pace = _characteristic(rsc.MEASUREMENT, _P.NOTIFY)
         self.services = [self._own(), Service("180F", [self.battery]), self._about()]
+        if bracelet.control:
+            feature = _characteristic(rsc.FEATURE, _P.READ, lambda: rsc.encode_feature(rsc.RUNNING))
+            self.services.append(Service("1814", [self.pace, feature]))
 
     def _own(self) -> Service:
         bracelet = self._bracelet

@@ -189,6 +189,11 @@ class Peripheral:
         if self._link is not None and not self.muted:
             await self.device.gatt_server.notify_subscriber(self._link, self._table.register)
 
+    async def notify_pace(self, value: bytes) -> None:
+        """Send running speed and cadence to whoever subscribed to it."""
+        if self._link is not None and not self.muted:
+            await self.device.gatt_server.notify_subscriber(self._link, self._table.pace, value)
+
     async def drop(self, reason: int = hci.HCI_ErrorCode.CONNECTION_TIMEOUT_ERROR) -> None:
         """End the link, by default as if it had been out of range; return when it has ended."""
         link = self._link
