@@ -63,7 +63,8 @@ class GattBracelet:
     `speed` is device seconds per second; `math.inf` plays as fast as the subscriber takes it, and stands still while
     there is none. `name` has at most 8 bytes, `max_mtu` is the largest ATT MTU agreed to (23…517). `played` is set once
     a finite source has been played to its end. `distort` maps an outgoing live packet to those that are sent instead:
-    none loses it, as a firmware does whose queue is full, two duplicate it. A report waits for the radio.
+    none loses it, as a firmware does whose queue is full, two duplicate it. A report waits for the radio. An
+    `encrypted` one wants to be paired with; keys are exchanged and compared, but the virtual radio ciphers nothing.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class GattBracelet:
         speed: float = 1.0,
         start: Start = Start.POWER_ON,
         max_mtu: int = 517,
+        encrypted: bool = False,
     ) -> None:
         if not speed > 0:
             raise ParameterError("speed", speed, "above 0, or inf")
@@ -89,6 +91,7 @@ class GattBracelet:
         self._speed = speed
         self._start = Start(start)
         self._max_mtu = max_mtu
+        self._encrypted = encrypted
         self._peripheral: Peripheral | None = None
         self._away = self._muted = False
         self._corrupt = 0
@@ -245,7 +248,12 @@ class GattBracelet:
 
     def _power_on(self, transport: Transport) -> Peripheral:
         peripheral = Peripheral(
-            transport, self.bracelet, name=self._name, max_mtu=self._max_mtu, on_asked=self._on_asked
+            transport,
+            self.bracelet,
+            name=self._name,
+            max_mtu=self._max_mtu,
+            encrypted=self._encrypted,
+            on_asked=self._on_asked,
         )
         peripheral.muted, peripheral.away = self._muted, self._away
         self._peripheral = peripheral

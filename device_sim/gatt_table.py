@@ -21,10 +21,14 @@ Asked = Callable[[object, bytes], None]
 
 
 class Table:
-    """What a bracelet serves; `on_request` takes the writes of its control point."""
+    """What a bracelet serves; `on_request` takes the writes of its control point.
 
-    def __init__(self, bracelet: Bracelet, on_request: Asked) -> None:
+    Where it is `encrypted`, its own service is read and written on an encrypted link only; the standard ones are open.
+    """
+
+    def __init__(self, bracelet: Bracelet, on_request: Asked, *, encrypted: bool) -> None:
         self._bracelet = bracelet
+        self._encrypted = encrypted
         self.data = _characteristic(wire.DATA, _P.NOTIFY)
         self.control = _characteristic(wire.CONTROL, _P.WRITE | _P.INDICATE, write=on_request)
         self.register = _characteristic(wire.REGISTER, _P.READ | _P.NOTIFY, bracelet.register_value)
@@ -51,7 +55,11 @@ class Table:
             values |= {wire.HISTORY: bracelet.history_value, wire.UTC: bracelet.utc_value}
         read = [_characteristic(uuid, _P.READ, value) for uuid, value in values.items()]
         more = [self.control, self.register] if bracelet.control else []
-        return Service(wire.SERVICE, [self.data, *more, *read])
+        all_of_it = [self.data, *more, *read]
+        if self._encrypted:
+            for one in all_of_it:
+                one.permissions |= Characteristic.READ_REQUIRES_ENCRYPTION | Characteristic.WRITE_REQUIRES_ENCRYPTION
+        return Service(wire.SERVICE, all_of_it)
 
     def _about(self) -> Service:
         texts = {

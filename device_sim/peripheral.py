@@ -73,7 +73,14 @@ class Peripheral:
     """
 
     def __init__(
-        self, transport: Transport, bracelet: Bracelet, *, name: str, max_mtu: int, on_asked: Callable[[], None]
+        self,
+        transport: Transport,
+        bracelet: Bracelet,
+        *,
+        name: str,
+        max_mtu: int,
+        encrypted: bool,
+        on_asked: Callable[[], None],
     ) -> None:
         config = DeviceConfiguration(
             name=name,
@@ -89,12 +96,13 @@ class Peripheral:
         self.away = False
         self.links_made = 0
         self.control = ControlPoint(bracelet)
-        self._table = Table(bracelet, self._on_request)
+        self._table = Table(bracelet, self._on_request, encrypted=encrypted)
         self.device.add_services(self._table.services)
         self._operations = Operations(name)
         self._answers = Operations(f"{name} answers")
         self._on_asked = on_asked
         self._has_control = bracelet.control
+        self._encrypted = encrypted
         self._subscribed = self._indicated = False
         """Whether the host has enabled the notifications of data, and the indications of the control point."""
         self._link: Connection | None = None
@@ -124,7 +132,10 @@ class Peripheral:
     @property
     def listening(self) -> bool:
         """Whether a host takes samples as they come."""
-        return self._subscribed and not self.muted and (self.control.streaming or not self._has_control)
+        in_the_clear = self._link is None or not self._link.is_encrypted
+        if not self._subscribed or self.muted or (self._encrypted and in_the_clear):
+            return False
+        return self.control.streaming or not self._has_control
 
     async def start(self) -> None:
         """Power on and advertise; LinkError where the controller does not answer."""

@@ -192,7 +192,9 @@ def _on_air(air: Any, bracelet: Bracelet, name: str, options: argparse.Namespace
     from device_sim.gatt import Start  # noqa: PLC0415
 
     start = Start.ON_SUBSCRIBE if options.recording or options.once else Start.POWER_ON
-    device: GattBracelet = air.bracelet(bracelet, name=name, speed=options.speed, start=start)
+    device: GattBracelet = air.bracelet(
+        bracelet, name=name, speed=options.speed, start=start, encrypted=options.encrypted
+    )
     return device
 
 

@@ -157,6 +157,11 @@ def _add_hardware(parser: argparse.ArgumentParser) -> None:
         metavar="H",
         help="how long its battery lasts from full to empty, 0.001–100000 h; then it is off (default for ever)",
     )
+    parser.add_argument(
+        "--encrypted",
+        action="store_true",
+        help="say and take nothing before it is paired with; the service does that by itself",
+    )
 
 
 def add_wrists(parser: argparse.ArgumentParser) -> None:

@@ -21,7 +21,7 @@ from bleak.backends.characteristic import BleakGATTCharacteristic
 from bleak.backends.client import BaseBleakClient
 from bleak.backends.device import BLEDevice
 from bleak.backends.scanner import AdvertisementData, BaseBleakScanner
-from bleak.exc import BleakBluetoothNotAvailableError, BleakError
+from bleak.exc import BleakBluetoothNotAvailableError, BleakError, BleakGATTProtocolError
 from bleak_retry_connector import BleakClientWithServiceCache, establish_connection
 
 from service.errors import LinkError, LinkFault
@@ -34,6 +34,8 @@ REQUEST_TIMEOUT_S = 5.0
 """Bound on one read, write or subscription."""
 SILENCE_S = 5.0
 """A link that is up but brings nothing for so long is dropped: no wearable we know pauses longer."""
+_WANTS_PAIRING = frozenset({0x05, 0x0F})
+"""ATT errors insufficient authentication and insufficient encryption: one pairs, and asks again."""
 QUEUE_PACKETS = 4096
 """Packets that may wait: 13 min at five a second. Policy: the newest is dropped, which shows as a gap."""
 
@@ -203,13 +205,22 @@ class BleLink:
                 return
             raise LinkError(LinkFault.NOT_OURS, f"{self._handle.address} has no characteristic {action.characteristic}")
         async with asyncio.timeout(REQUEST_TIMEOUT_S):
-            match action:
-                case Read():
-                    self._put(action.characteristic, await client.read_gatt_char(characteristic))
-                case Subscribe():
-                    await client.start_notify(characteristic, self._notified)
-                case Write():
-                    await client.write_gatt_char(characteristic, action.data, response=True)
+            try:
+                await self._carry_out(client, characteristic, action)
+            except BleakGATTProtocolError as error:
+                if error.code not in _WANTS_PAIRING:
+                    raise
+                await client.pair()
+                await self._carry_out(client, characteristic, action)
+
+    async def _carry_out(self, client: BleakClient, characteristic: BleakGATTCharacteristic, action: Action) -> None:
+        match action:
+            case Read():
+                self._put(action.characteristic, await client.read_gatt_char(characteristic))
+            case Subscribe():
+                await client.start_notify(characteristic, self._notified)
+            case Write():
+                await client.write_gatt_char(characteristic, action.data, response=True)
 
     def _notified(self, characteristic: BleakGATTCharacteristic, data: bytearray) -> None:
         self._put(characteristic.uuid, data)
