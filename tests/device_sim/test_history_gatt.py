@@ -8,6 +8,8 @@ from bleak.exc import BleakGATTProtocolError
 
 from device_sim.air import LocalAir
 from device_sim.bracelet import Bracelet, quantise
+from service.links.ble import Backend, BleLink
+from service.samples import DeviceInfo, RawBlock, Reply
 from service.wearables import bracelet as wire
 from service.wearables import bracelet_control as control
 
@@ -197,6 +199,29 @@ async def test_what_was_measured_out_of_range_is_asked_for_and_complete(stage, r
         got = np.concatenate([np.transpose(block.acc_g) for block in again.again])
         assert np.array_equal(np.rint(got * 4096), quantise(source.acc_g[last:first], 4096))
         assert gatt.statistics().lost == 0
+
+
+async def test_the_services_link_asks_and_is_answered(radio):
+    async with (
+        LocalAir() as air,
+        air.bracelet(Bracelet(radio.Endless()), speed=20) as gatt,
+        air.central() as central,
+    ):
+        gatt.bracelet.measure(500)
+        wearable, said = wire.Bracelet(), []
+        backend = Backend(scanner=central.scanner, client=central.client)
+        async with BleLink(await radio.seen(central), wearable.handshake(), backend) as link:
+            async for packet in link:
+                said.append(wearable.feed(packet.characteristic, packet.data))
+                if said[-1] == Reply(request="start", accepted=True):
+                    (request,) = wearable.history(1, 100, 300)
+                    await link.request(request)
+                if isinstance(said[-1], Reply) and said[-1].request == "history":
+                    break
+        assert said[-1] == Reply(request="history", accepted=True, boot=1, first=100, samples=300)
+        blocks = [one for one in said if isinstance(one, RawBlock)]
+        assert sum(len(block) for block in blocks if block.history) == 300
+        assert any(isinstance(one, DeviceInfo) and one.history_samples == 30_000 for one in said)
 
 
 async def test_a_report_ends_with_its_listener_and_with_its_link(stage, radio):
