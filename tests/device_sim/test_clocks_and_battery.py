@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from device_sim.air import LocalAir
@@ -69,6 +69,7 @@ class Waves:
         return int(t_s)
 
 
+@settings(max_examples=30)
 @given(
     rate_hz=st.sampled_from([12.5, 25.0, 50.0, 100.0, 52.0]),
     chunks=st.lists(st.integers(0, 60), min_size=1, max_size=10),
@@ -141,6 +142,7 @@ def test_a_battery_lasts_as_long_as_it_says(radio):
     assert bracelet.battery_value() == b"\0"
 
 
+@pytest.mark.full
 async def test_a_battery_is_told_by_the_percent_and_when_it_is_empty_the_bracelet_is_gone(radio):
     bracelet = Bracelet(radio.Endless(), battery_hours=0.2)  # 7.2 s a percent
     async with LocalAir() as air, air.bracelet(bracelet, speed=100) as gatt, air.central() as central:
@@ -162,6 +164,7 @@ async def test_a_battery_is_told_by_the_percent_and_when_it_is_empty_the_bracele
         await again.got(20)
 
 
+@pytest.mark.full
 async def test_the_register_is_told_while_somebody_walks(radio):
     bracelet = Bracelet(Walker("normal:60", seed=1, loop=True))
     async with LocalAir() as air, air.bracelet(bracelet, speed=40), air.central() as central:

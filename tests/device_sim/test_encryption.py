@@ -12,6 +12,7 @@ from service.wearables import bracelet_control as control
 INSUFFICIENT_ENCRYPTION = 0x0F
 
 
+@pytest.mark.full
 async def test_its_own_service_is_closed_until_it_is_paired_with(on_air, radio):
     async with on_air(encrypted=True) as (_, central):
         host = await radio.Host.connect(central)
@@ -29,6 +30,7 @@ async def test_its_own_service_is_closed_until_it_is_paired_with(on_air, radio):
         await host.got(20)
 
 
+@pytest.mark.full
 async def test_old_firmware_sends_nothing_in_the_clear_either(radio):
     bracelet = Bracelet(radio.Endless(), control=False)
     async with (

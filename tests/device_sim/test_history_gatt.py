@@ -50,6 +50,7 @@ async def write(host, request):
     await host.client.write_gatt_char(wire.CONTROL, getattr(request, "data", request), response=True)
 
 
+@pytest.mark.full
 async def test_data_comes_between_start_and_stop(stage):
     async with stage() as (gatt, host):
         await asyncio.sleep(0.1)
@@ -65,6 +66,7 @@ async def test_data_comes_between_start_and_stop(stage):
         assert max(np.diff([block.index for block in host.blocks])) > 20  # what was measured meanwhile is history
 
 
+@pytest.mark.full
 async def test_a_rate_is_a_new_numbering_and_what_it_says_is_so(stage):
     async with stage(speed=8) as (gatt, host):
         said = await host.ask(control.set_rate(100.0))
@@ -116,6 +118,7 @@ async def test_no_request_is_taken_while_indications_are_off(stage):
 
 
 @pytest.mark.parametrize("max_mtu", [23, 517])
+@pytest.mark.full
 async def test_history_is_sample_for_sample_what_live_data_was(stage, radio, max_mtu):
     source = radio.Known(3000)
     async with stage(source=source, speed=40, max_mtu=max_mtu) as (gatt, host):
@@ -181,6 +184,7 @@ async def test_a_range_that_is_partly_gone_and_one_of_another_boot(stage):
         assert (extent.boot, extent.samples) == (1, 500)
 
 
+@pytest.mark.full
 async def test_what_was_measured_out_of_range_is_asked_for_and_complete(stage, radio):
     source = radio.Known(20_000)
     async with stage(source=source, speed=40) as (gatt, host):
@@ -224,6 +228,7 @@ async def test_the_services_link_asks_and_is_answered(radio):
         assert any(isinstance(one, DeviceInfo) and one.history_samples == 30_000 for one in said)
 
 
+@pytest.mark.full
 async def test_a_report_ends_with_its_listener_and_with_its_link(stage, radio):
     async with stage(max_mtu=23) as (gatt, host):
         gatt.bracelet.measure(20_000)
@@ -242,6 +247,7 @@ async def test_a_report_ends_with_its_listener_and_with_its_link(stage, radio):
         assert again.again == []
 
 
+@pytest.mark.full
 async def test_old_firmware_streams_to_whoever_subscribes(radio):
     async with LocalAir() as air, air.central() as central:
         bracelet = Bracelet(radio.Endless(), control=False)

@@ -24,6 +24,7 @@ def test_cadence_is_that_of_the_last_seconds_and_begins_anew_with_the_register()
 
 
 @pytest.mark.parametrize(("walk", "running"), [("normal:60@110", False), ("run:60@170", True)])
+@pytest.mark.full
 async def test_a_host_hears_the_walkers_cadence(radio, walk, running):
     bracelet = Bracelet(Walker(walk, seed=1, loop=True))
     async with LocalAir() as air, air.bracelet(bracelet, speed=40), air.central() as central:
