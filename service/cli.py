@@ -215,6 +215,7 @@ def _bracelet(options: argparse.Namespace, device: str, *, mirrored: bool = Fals
 
     from device_sim.bracelet import Bracelet  # noqa: PLC0415
 
+    offset_s = options.utc_offset_s
     # Boots count upwards for ever; a simulated bracelet keeps no flash memory, so the clock counts for it.
     return Bracelet(
         _source(options, mirrored=mirrored),
@@ -225,6 +226,7 @@ def _bracelet(options: argparse.Namespace, device: str, *, mirrored: bool = Fals
         drift_ppm=options.drift_ppm,
         sensor_ppm=options.sensor_ppm,
         battery_hours=options.battery_hours,
+        utc_ms=None if offset_s is None else time.time_ns() // 1_000_000 + round(offset_s * 1000),
     )
 
 

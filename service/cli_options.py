@@ -152,6 +152,12 @@ def _add_hardware(parser: argparse.ArgumentParser) -> None:
         help="how fast its sensor samples against that clock, -10000–10000 ppm: the rate's error (default 0)",
     )
     parser.add_argument(
+        "--utc-offset-s",
+        type=number(-86_400, 86_400),
+        metavar="S",
+        help="how far its own UTC is ahead, -86400–86400 s (default: it does not know the time until it is told)",
+    )
+    parser.add_argument(
         "--battery-hours",
         type=number(0.001, 100_000),
         metavar="H",

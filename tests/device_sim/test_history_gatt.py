@@ -12,6 +12,7 @@ from service.links.ble import Backend, BleLink
 from service.samples import DeviceInfo, RawBlock, Reply
 from service.wearables import bracelet as wire
 from service.wearables import bracelet_control as control
+from service.wearables.bracelet_values import decode_utc
 
 
 @pytest.fixture
@@ -259,3 +260,13 @@ async def test_old_firmware_streams_to_whoever_subscribes(radio):
             await host.client.start_notify(wire.DATA, host._take)
             await host.got(50)
             await radio.until(lambda: gatt.subscribed)
+
+
+async def test_the_clock_that_a_host_sets_is_the_one_it_reads(radio):
+    async with LocalAir() as air, air.bracelet(Bracelet(radio.Endless())) as _, air.central() as central:
+        host = await radio.Host.connect(central)
+        assert decode_utc(bytes(await host.client.read_gatt_char(wire.UTC))) is None
+        await host.enable_answers()
+        assert (await host.ask(control.set_time(1_790_000_000_000))).request == "time"
+        told_ms = decode_utc(bytes(await host.client.read_gatt_char(wire.UTC)))
+        assert 0 <= told_ms - 1_790_000_000_000 < 5000
