@@ -132,8 +132,9 @@ class Peripheral:
     @property
     def listening(self) -> bool:
         """Whether a host takes samples as they come."""
-        in_the_clear = self._link is None or not self._link.is_encrypted
-        if not self._subscribed or self.muted or (self._encrypted and in_the_clear):
+        if self._link is None or not self._subscribed or self.muted:
+            return False
+        if self._encrypted and not self._link.is_encrypted:
             return False
         return self.control.streaming or not self._has_control
 
