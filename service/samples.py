@@ -172,15 +172,18 @@ class DeviceInfo:
     sensors: Sensors | None = None
     history_samples: int | None = None
     """How many of its newest samples it can send again; 0 or None: none."""
+    register_steps: int | None = None
+    """What its own simple counter has counted since boot: to be shown beside our count, never summed into it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
     """A device's answer to a request.
 
-    `request` names it ("start", "stop", "rate", "range", "time", "history"); `why` is a sentence where it was not
-    `accepted`. Of history, the device has sent again all that it held of the range asked for: `samples` of them from
-    `first` (u32) of boot `boot` on. What was asked for and lies outside of that it does not have any more.
+    `request` names it ("start", "stop", "rate", "range", "time", "history", "extent", "abort"); `why` is a sentence
+    where it was not `accepted`. Of history, the device has sent again all that it held of the range asked for:
+    `samples` of them from `first` (u32) of boot `boot` on. What was asked for and lies outside of that it does not
+    have any more.
     """
 
     request: str

@@ -24,7 +24,7 @@ from bleak.backends.characteristic import BleakGATTCharacteristic
 from bleak.backends.client import BaseBleakClient
 from bleak.backends.device import BLEDevice
 from bleak.backends.scanner import AdvertisementData, BaseBleakScanner
-from bleak.exc import BleakBluetoothNotAvailableError, BleakError
+from bleak.exc import BleakBluetoothNotAvailableError, BleakError, BleakGATTProtocolError
 from bleak_retry_connector import (
     BleakClientWithServiceCache,
     clear_cache,
@@ -38,6 +38,8 @@ from service.wearables.contract import Action, Read, Subscribe, Write
 
 STALE_TIMEOUT_S = 10.0
 """Bound on closing what an earlier run left connected, of all devices together."""
+_WANTS_PAIRING = frozenset({0x05, 0x0F})
+"""ATT errors insufficient authentication and insufficient encryption: one pairs, and asks again."""
 QUEUE_PACKETS = 4096
 """Packets that may wait: 13 min at five a second. Policy: the newest is dropped, which shows as a gap."""
 
@@ -258,13 +260,22 @@ class BleLink:
             await self._forget_services()
             raise LinkError(LinkFault.NOT_OURS, f"{self._handle.address} has no characteristic {action.characteristic}")
         async with asyncio.timeout(self._timeouts.request_s):
-            match action:
-                case Read():
-                    self.said.append(self._put(action.characteristic, await client.read_gatt_char(characteristic)))
-                case Subscribe():
-                    await client.start_notify(characteristic, self._notified)
-                case Write():
-                    await client.write_gatt_char(characteristic, action.data, response=True)
+            try:
+                await self._carry_out(client, characteristic, action)
+            except BleakGATTProtocolError as error:
+                if error.code not in _WANTS_PAIRING:
+                    raise
+                await client.pair()
+                await self._carry_out(client, characteristic, action)
+
+    async def _carry_out(self, client: BleakClient, characteristic: BleakGATTCharacteristic, action: Action) -> None:
+        match action:
+            case Read():
+                self.said.append(self._put(action.characteristic, await client.read_gatt_char(characteristic)))
+            case Subscribe():
+                await client.start_notify(characteristic, self._notified)
+            case Write():
+                await client.write_gatt_char(characteristic, action.data, response=True)
 
     async def _forget_services(self) -> None:
         """Have the next connection discover anew: what is missing may be missing in a cache only."""
