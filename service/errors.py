@@ -82,6 +82,7 @@ class LinkFault(StrEnum):
     LOST = "lost"
     SILENT = "silent"
     NOT_OURS = "not_ours"
+    TWIN = "twin"
     REFUSED = "refused"
 
 

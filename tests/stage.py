@@ -32,6 +32,7 @@ class Stage:
     http: httpx.AsyncClient
     supervisor: Supervisor
     bracelet: GattBracelet
+    bracelets: list[GattBracelet]
 
     @property
     def live_url(self):
@@ -67,12 +68,11 @@ def default_tracker(wearable):
 async def staged(bracelet, *others, **options):
     """Run the service over bracelets on a local air; everything is closed and joined at the end."""
     radio = {name: value for name, value in options.items() if name not in SERVICE}
-    options = {name: value for name, value in options.items() if name in SERVICE}
     async with contextlib.AsyncExitStack() as stack:
         air = await stack.enter_async_context(LocalAir())
-        gatt, *_ = [await stack.enter_async_context(air.bracelet(worn, **radio)) for worn in (bracelet, *others)]
-        async with serving(air, gatt, **options) as stage:
-            yield stage
+        gatts = [await stack.enter_async_context(air.bracelet(worn, **radio)) for worn in (bracelet, *others)]
+        service = {name: value for name, value in options.items() if name in SERVICE}
+        yield await stack.enter_async_context(serving(air, gatts, **service))
 
 
 SERVICE = {"durable_limit", "wanted", "counter", "beside", "path", "keep"}
@@ -80,7 +80,7 @@ SERVICE = {"durable_limit", "wanted", "counter", "beside", "path", "keep"}
 
 
 @contextlib.asynccontextmanager
-async def serving(air, gatt=None, *, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), path=None, keep=None):
+async def serving(air, gatts=(), *, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), path=None, keep=None):
     """Run the service over an air that is there; it stores at `path`, else where nobody looks."""
     async with contextlib.AsyncExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
@@ -101,7 +101,7 @@ async def serving(air, gatt=None, *, durable_limit=1000, wanted=None, counter=DE
             async with asyncio.timeout(10):
                 await ready.wait()
             async with httpx.AsyncClient(base_url=url, trust_env=False) as http:
-                yield Stage(url, http, supervisor, gatt)
+                yield Stage(url, http, supervisor, gatts[0] if gatts else None, list(gatts))
         finally:
             server.cancel()
             await asyncio.gather(server, return_exceptions=True)

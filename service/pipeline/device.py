@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import random
 import time
 from collections.abc import Callable
 
 from service.counters import registry
-from service.errors import CounterError, LinkError, NotNowError
-from service.links.ble import Sighting
+from service.errors import CounterError, LinkError, LinkFault, NotNowError
 from service.links.contract import Link
 from service.pipeline.calibration import Calibration, Plan
 from service.pipeline.calibrations import Calibrations
 from service.pipeline.journal import Journal
-from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State, advance, backoff_s
+from service.pipeline.lifecycle import LINKED, PATIENCE, WAITING, Cause, Patience, Standing, State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Publish, Session
@@ -25,73 +25,96 @@ from service.wearables.contract import Wearable
 
 logger = logging.getLogger(__name__)
 
+TWIN_WAIT_S = 300.0
+"""Wait before a device is tried again that calls itself by the name of one which is connected."""
+TWIN_GRACE_S = 5.0
+"""Once that one has been lost for so long, its twin is tried at once: it may be the same, under a new address."""
+FORGET_S = 1800.0
+"""An address that never told an id is kept for so long after it was last heard; private ones change every 15 min."""
+UNHEARD = "not heard since the service started"
+
 
 class Device:
-    """One device, from the first time it is heard."""
+    """One device, from the first time it is heard; or, without `rssi_dbm`, known from before and not heard yet."""
 
     def __init__(
         self,
+        *,
         address: str,
+        name: str | None = None,
+        rssi_dbm: int | None = None,
         wearable: Wearable,
         lineup: Lineup,
         publish: Publish,
-        *,
-        name: str | None = None,
+        patience: Patience = PATIENCE,
         journal: Journal | None = None,
     ) -> None:
         self.address = address
         self.name = name
-        self.rssi_dbm: int | None = None
+        self.rssi_dbm = rssi_dbm
         self.wearable = wearable
         self.lineup = lineup
-        self._asked_lineup = lineup.plain()
+        self._told_lineup = lineup.plain()
         """As the service was told to count when the session began."""
         self._publish = publish
         self.session = self._new_session(journal)
         self.calibrations = Calibrations(self.session)
-        self.state = State.SEEN
-        self.reason: str | None = None
+        self.reason: str | None = UNHEARD if rssi_dbm is None else None
         self.since_ns = time.time_ns()
         self.wanted = False
-        self.not_before_s = 0.0
-        """Monotonic time before which no attempt is made."""
+        self.asked = False
+        """Whether somebody asked for it to be connected, as opposed to an option that wants all or some."""
+        self.twin: Device | None = None
+        """The connected device for whose sake this one was turned away."""
         self.task: asyncio.Task[None] | None = None
-        self.keeping: asyncio.Task[None] | None = None
-        """Has what the session tells stored."""
-        self.on_new_session: Callable[[Device], None] = lambda _: None
-        """Called when another session has begun, to begin keeping it."""
-        self._failures = 0
+        self.keep: Callable[[Session], asyncio.Task[None]] | None = None
+        """Begins to keep what a session tells, from the first link on; None where nothing is stored."""
+        self._keeping: asyncio.Task[None] | None = None
+        self._patience = patience
+        self._standing = Standing(state=State.LOST if rssi_dbm is None else State.SEEN)
+        self._fault: LinkFault | None = None
+        """Why the last attempt failed or the last link was lost."""
+        self._moved_s = self._heard_s = time.monotonic()
         self._told_s = 0.0
 
     @classmethod
     def restored(cls, found: Resumable, wearable: Wearable, publish: Publish, journal: Journal) -> Device:
-        """Return the device of a stored session as it was at its last snapshot; what was stored since is to be replayed.
+        """Return the device of a stored session as its last snapshot has it; what was stored since is to be replayed.
 
-        SnapshotError, CounterError, ParameterError or KeyError where
-        the session cannot go on.
+        SnapshotError, CounterError, ParameterError or KeyError where the session cannot go on.
         """
         about = found.about or {}
-        kept = Lineup.from_plain(about["lineup"])
-        device = cls(about["address"], wearable, kept, publish, name=about["name"], journal=journal)
-        device._asked_lineup = about["asked"]
-        device.wanted = about["wanted"]
-        device.state = State.LOST if device.wanted else State.DISCONNECTED
+        device = cls(
+            address=about["address"],
+            name=about["name"],
+            wearable=wearable,
+            lineup=Lineup.from_plain(about["lineup"]),
+            publish=publish,
+            journal=journal,
+        )
+        device._told_lineup = about["told_lineup"]
+        device.wanted, device.asked = about["wanted"], about["asked"]
         device.session.resume(found)
         return device
 
     def obey(self, lineup: Lineup) -> None:
         """Count as the service is told to now, if that is not what it was told when the session began."""
-        if self._asked_lineup == lineup.plain():
+        if self._told_lineup == lineup.plain():
             return
-        self._asked_lineup = lineup.plain()
+        self._told_lineup = lineup.plain()
         try:
             self.count_with(lineup)
         except CounterError as error:
             logger.warning("%s goes on with its counters: %s", self.id, error)
 
+    def begin_keeping(self) -> None:
+        """Have what the session tells stored, from now on."""
+        if self._keeping is None and self.keep is not None:
+            self._keeping = self.keep(self.session)
+
     def _new_session(self, journal: Journal | None) -> Session:
         tracker = BackfillTracker(self.wearable, self.lineup.makers, primary=self.lineup.primary)
-        return Session(lambda: self.id, tracker, self._publish, journal, self._about)
+        return Session(lambda: self.id, tracker, self._publish, journal, self._about, self.wearable.history)
 
     def _about(self) -> dict[str, object]:
         """Return what a restart needs beside the count, as plain data."""
@@ -99,8 +122,9 @@ class Device:
             "address": self.address,
             "name": self.name,
             "wanted": self.wanted,
+            "asked": self.asked,
             "lineup": self.lineup.plain(),
-            "asked": self._asked_lineup,
+            "told_lineup": self._told_lineup,
         }
 
     @property
@@ -109,15 +133,41 @@ class Device:
         return self.session.tracker.info.device or self.address
 
     @property
+    def is_provisional(self) -> bool:
+        """Whether the device has not told its id yet."""
+        return self.session.tracker.info.device is None
+
+    @property
+    def is_forgettable(self) -> bool:
+        """Whether it is but an address that has not been heard for long: a private one, changed since."""
+        return self.is_provisional and self.state in WAITING and time.monotonic() - self._heard_s >= FORGET_S
+
+    @property
+    def state(self) -> State:
+        """Where its connection stands."""
+        return self._standing.state
+
+    @property
+    def not_before_s(self) -> float:
+        """Monotonic time before which no attempt is made."""
+        return self._standing.not_before_s
+
+    @property
     def is_due(self) -> bool:
         """Whether an advertisement should start an attempt now."""
-        return self.wanted and self.state in WAITING and time.monotonic() >= self.not_before_s
+        if not self.wanted:
+            return False
+        return self._standing.is_due(time.monotonic()) or (self.state in WAITING and self._twin_is_gone())
 
     def count_with(self, lineup: Lineup) -> None:
         """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
         registry.require_sensors(lineup.primary, self.session.tracker.info.sensors)
-        self.lineup = lineup
-        self.session.change_counters(lineup)
+        before, self.lineup = self.lineup, lineup
+        try:
+            self.session.change_counters(lineup)
+        except Exception:
+            self.lineup = before
+            raise
 
     def require_streaming(self) -> None:
         """Raise NotNowError unless the device streams."""
@@ -132,29 +182,44 @@ class Device:
             raise CounterError(why)
         return self.calibrations.begin(plan)
 
-    def heard(self, sighting: Sighting, *, tell_every_s: float) -> None:
+    def heard(self, name: str | None, rssi_dbm: int, *, tell_every_s: float) -> None:
         """Take an advertisement."""
-        self.name, self.rssi_dbm = sighting.name or self.name, sighting.rssi_dbm
+        self.name, self.rssi_dbm = name or self.name, rssi_dbm
+        self._heard_s = time.monotonic()
         if time.monotonic() - self._told_s >= tell_every_s:
-            self._told_s = time.monotonic()
-            self.session.tell(DeviceChanged(), time.time_ns())
+            self.describe()
 
-    def move(self, cause: Cause, reason: str | None = None) -> None:
+    def moved_to(self, other: Device) -> None:
+        """Go on under the address of `other`, which turned out to be this one."""
+        self.address, self.name, self.rssi_dbm = other.address, other.name or self.name, other.rssi_dbm
+        if other.asked and not self.wanted:
+            self.want()
+        self.describe()
+
+    def describe(self) -> None:
+        """Tell that the device's description has changed."""
+        self._told_s = time.monotonic()
+        self.session.tell(DeviceChanged(), time.time_ns())
+
+    def move(self, cause: Cause, reason: str | None = None, *, least_s: float = 0.0) -> None:
         """Move the connection's state on, and tell."""
-        self.state = advance(self.state, cause)
+        self._moved_s = time.monotonic()
+        how = {"jitter": random.random(), "least_s": least_s}  # noqa: S311  # no secret
+        self._standing = self._standing.after(cause, now_s=self._moved_s, patience=self._patience, **how)
         self.reason, self.since_ns = reason, time.time_ns()
         self.session.state_changed(self.state, reason)
 
     def want(self) -> None:
         """Have it connected as soon as it is heard."""
-        self.wanted = True
-        self.not_before_s, self._failures = 0.0, 0
+        self.wanted = self.asked = True
         if self.state is State.DISCONNECTED:
             self.move(Cause.WANTED)
+        else:
+            self._standing = self._standing.after(Cause.WANTED, now_s=time.monotonic())
 
     def unwant(self) -> None:
         """Close its link and leave it alone."""
-        self.wanted = False
+        self.wanted = self.asked = False
         self.move(Cause.UNWANTED)
         self.stop()
 
@@ -188,10 +253,11 @@ class Device:
     async def _rest(self) -> None:
         """Close its link and stop storing; return when both have ended."""
         self.stop()
-        for task in (self.task, self.keeping):
+        for task in (self.task, self._keeping):
             if task is not None:
                 task.cancel()
                 await asyncio.wait({task})
+        self._keeping = None
 
     def _begin_anew(self) -> None:
         self.calibrations.leave()
@@ -199,30 +265,26 @@ class Device:
         self.session = self._new_session(before.journal.successor())
         self.session.take_over(before)
         self.calibrations = Calibrations(self.session)
-        self.session.tell(DeviceChanged(), time.time_ns())
-        self.on_new_session(self)
+        self.describe()
 
-    async def run(self, link: Link, settled: asyncio.Event, jitter: Callable[[], float]) -> None:
-        """Hold the link until it is lost or no longer wanted; `settled` is set once it is connected or has failed."""
-        connected_s: float | None = None
-        try:
-            async with link:
-                connected_s = time.monotonic()
-                self.move(Cause.CONNECTED)
-                settled.set()
-                await self.session.follow(link)
-        except LinkError as error:
-            self._lost(error.why, connected_s, jitter())
-        except Exception as error:
-            logger.exception("link of %s", self.address)
-            self._lost(f"an internal error: {error!r}", connected_s, jitter())
+    async def run(self, link: Link, on_connected: Callable[[], None]) -> None:
+        """Follow an open link until it is lost (LinkError) or the task is cancelled."""
+        self.move(Cause.CONNECTED)
+        self.twin = None
+        on_connected()
+        self.begin_keeping()
+        await self.session.follow(link)
 
-    def _lost(self, why: str, connected_s: float | None, jitter: float) -> None:
-        """Note that the link failed or was lost, and when to try again."""
+    def lost(self, error: LinkError) -> None:
+        """Note that the link failed or was lost, and why; nothing where it is not wanted any more."""
         if self.state not in LINKED:
             return
-        if connected_s is not None and time.monotonic() - connected_s >= HEALTHY_S:
-            self._failures = 0
-        self._failures += 1
-        self.not_before_s = time.monotonic() + backoff_s(self._failures, jitter)
-        self.move(Cause.FAILED if connected_s is None else Cause.DROPPED, why)
+        # What BlueZ remembered of the services has been forgotten: once more at once, from then on with patience.
+        again = error.reason is LinkFault.NOT_OURS and self._fault is LinkFault.NOT_OURS
+        least_s = TWIN_WAIT_S if error.reason is LinkFault.TWIN else self._patience.cap_s if again else 0.0
+        self._fault = error.reason
+        self.move(Cause.FAILED if self.state is State.CONNECTING else Cause.DROPPED, error.why, least_s=least_s)
+
+    def _twin_is_gone(self) -> bool:
+        twin = self.twin
+        return twin is not None and twin.state not in LINKED and time.monotonic() - twin._moved_s >= TWIN_GRACE_S  # noqa: SLF001  # its own kind

@@ -23,6 +23,7 @@ from service.signals.hosttime import HostClock
 from service.store.chunker import blocks
 from service.store.values import Chunk, Cursor, Description, Resumable, SessionKey
 from service.tracking.backfill import BackfillTracker
+from service.wearables.contract import Write
 
 YIELD_EVERY: Final = 64
 """Packets handled in a row before others may run: 64 × 100 µs."""
@@ -44,7 +45,8 @@ logger = logging.getLogger(__name__)
 class Session:
     """One device's counting, over any number of links.
 
-    `name_device` gives its id, `publish` takes each notice, `about` tells what a restart needs beside the count.
+    `name_device` gives its id, `publish` takes each notice, `about` tells what a restart needs beside the count, and
+    `history` which writes ask the device for samples again.
     """
 
     def __init__(
@@ -54,8 +56,10 @@ class Session:
         publish: Publish,
         journal: Journal | None = None,
         about: Callable[[], Mapping[str, Any]] = dict,
+        history: Callable[[int, int, int], Sequence[Write]] = lambda _boot, _first, _samples: (),
     ) -> None:
         self._name_device = name_device
+        self._history = history
         self.tracker = tracker
         self.since_ns = time.time_ns()
         self.journal = journal or Journal()
@@ -66,7 +70,7 @@ class Session:
         self._clocks = {0: HostClock()}
         """By run: what is counted late may belong to an earlier one."""
         self._ordinal = 0
-        self._told_ns = 0
+        self._told_ns = self._arrived_ns = 0
         self._faults: dict[str, str] = {}
         self._warned: set[str] = set()
         self._behind = asyncio.Event()
@@ -94,10 +98,11 @@ class Session:
     def apply(self, packet: Packet) -> None:
         """Take one packet, from any link."""
         tracker = self.tracker
-        newest, run = (tracker.run, tracker.now_s), tracker.cursor.run
+        run, newest_s = tracker.cursor[0], tracker.now_s
         events = tracker.apply(packet)
-        if (tracker.run, tracker.now_s) != newest:
-            self._clock(tracker.run).arrived(tracker.now_s, packet.at_ns)
+        self._arrived_ns = packet.at_ns
+        if (tracker.cursor[0], tracker.now_s) != (run, newest_s):
+            self._clock(tracker.cursor[0]).arrived(tracker.now_s, packet.at_ns)
         self._tell_all(events, run, packet.at_ns)
         self._heard.set()
         if tracker.has_work:
@@ -108,7 +113,7 @@ class Session:
 
     def change_counters(self, lineup: Lineup) -> None:
         """Go on with other counters, and tell what that decided."""
-        run = self.tracker.cursor.run
+        run = self.tracker.cursor[0]
         self._tell_all(self.tracker.change_counters(lineup.makers, primary=lineup.primary), run, time.time_ns())
         self.tell(DeviceChanged(), time.time_ns())
         self.journal.mark()
@@ -133,13 +138,12 @@ class Session:
     def replay(self, item: Chunk | Description, counted: Cursor | None) -> None:
         """Count again what was stored; up to `counted` it was told before, and what is missing there is lost."""
         if isinstance(item, Description):
-            heard = Heard(
-                run=item.run, boot=item.boot, index=item.index, characteristic=item.characteristic, data=item.value
-            )
-            self.tracker.replay_heard(heard)
+            self.tracker.replay_heard(item.characteristic, item.value)
             return
         for block in blocks(item):
             self.tracker.replay_block(item.run, block, counted.place if counted else (0, 0))
+            while self.tracker.has_work:
+                self.tracker.catch_up()
 
     # What goes out
 
@@ -169,7 +173,7 @@ class Session:
         if not isinstance(event, UNNUMBERED):
             self._ordinal += 1
             ordinal = self._ordinal
-        run = self.tracker.cursor.run if run is None else run
+        run = self.tracker.cursor[0] if run is None else run
         notice = Notice(
             device=self._name_device(),
             at_ns=at_ns,
@@ -205,9 +209,9 @@ class Session:
     def _standing(self) -> Standing:
         return Standing(cursor=self._cursor(), state=self._state, about=self._about())
 
-    def _cursor(self) -> Cursor | None:
-        place = self.tracker.cursor
-        return None if place is None else Cursor(run=place.run, boot=place.boot, index=place.index)
+    def _cursor(self) -> Cursor:
+        run, boot, index = self.tracker.cursor
+        return Cursor(run=run, boot=boot, index=index)
 
     def _state(self) -> dict[str, Any]:
         clocks = {str(run): clock.snapshot() for run, clock in self._clocks.items()}
@@ -221,24 +225,36 @@ class Session:
             while self.tracker.has_work:
                 began_s = time.perf_counter()
                 while self.tracker.has_work and time.perf_counter() - began_s < SLICE_S:
-                    run = self.tracker.cursor.run
-                    self._tell_all(self.tracker.catch_up(), run, time.time_ns())
+                    self._catch_up_a_slice()
                 await asyncio.sleep(0)
+
+    def _catch_up_a_slice(self) -> None:
+        run = self.tracker.cursor[0]
+        events = self.tracker.catch_up()
+        if self.tracker.cursor[0] != run:  # the new run's first packets have waited for the earlier one's last
+            self._clock(self.tracker.cursor[0]).arrived(self.tracker.now_s, self._arrived_ns)
+        self._tell_all(events, run, time.time_ns())
 
     async def _ask(self, link: Link) -> None:
         """Ask the device for what is missing, a piece at a time, as long as the link holds."""
         while True:
             await self._heard.wait()
             self._heard.clear()
-            missing = self.tracker.wanted()
-            if missing is None:
+            if (missing := self.tracker.wanted()) is None:
                 continue
+            self.tracker.ask(missing)
             try:
-                for write in self.tracker.history(missing):
+                for write in self._history(missing.boot, missing.first, missing.samples):
                     await link.request(write)
+                async with asyncio.timeout(ANSWER_S):
+                    while self.tracker.asked == missing:
+                        await self._heard.wait()
+                        self._heard.clear()
             except LinkError as error:
-                logger.info("%s could not be asked for what is missing: %s", self._name_device(), error)
+                logger.info("%s was not asked for what is missing: %s", self._name_device(), error)
                 return
+            except TimeoutError:
+                self.tracker.unanswered()
 
     def _tell_faults(self) -> None:
         """Tell at once that a counter cannot count, or can again; say on the log why, once a session."""
@@ -268,4 +284,4 @@ class Session:
             case Gap():
                 return self._clock(run).at_ns(event.to_s)
             case _:
-                return self._clock(self.tracker.run).at_ns(self.tracker.now_s)
+                return self._clock(run).at_ns(self.tracker.now_s)

@@ -1,8 +1,9 @@
-"""The supervisor: knows every device, keeps the wanted ones connected, one connect at a time.
+"""The supervisor: knows every device, keeps the wanted ones connected for ever, one connect at a time.
 
 It scans until a wanted device is heard whose back-off has passed, stops the scanner (adapters do one thing at a time),
 connects from that fresh scan result, and scans on. Each link lives in a task of its own; a lost one leaves its session
-as it is and the device is looked for again. No Bluetooth at all is a state that is told, and tried again.
+as it is and the device is looked for again. A device that turns out to be one known already, under another address, is
+that one: see the roster. No Bluetooth at all is a state that is told, and tried again.
 """
 
 from __future__ import annotations
@@ -10,17 +11,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import random
 from collections.abc import AsyncIterator, Callable, Collection
 
-from service.errors import LinkError, NotNowError, StoreError, UnknownDeviceError
-from service.links.ble import PLATFORM, Backend, BleLink, Sighting, scanning
+from service.errors import LinkError, LinkFault, NotNowError, StoreError
+from service.links.ble import DEFAULT_TIMEOUTS, PLATFORM, Backend, BleLink, Sighting, Timeouts, close_stale, scanning
+from service.links.contract import Link
 from service.pipeline.archive import Archive
 from service.pipeline.device import Device
 from service.pipeline.hub import Hub
 from service.pipeline.journal import Journal
-from service.pipeline.lifecycle import Cause
+from service.pipeline.lifecycle import LINKED, PATIENCE, Cause, Patience
 from service.pipeline.lineup import Lineup
+from service.pipeline.roster import Roster, told_id
+from service.pipeline.session import Session
 from service.wearables.contract import Wearable
 
 SCANNER_RETRY_S = 2.0
@@ -48,31 +51,41 @@ class Supervisor:
         lineup: Lineup,
         wanted: Collection[str] | None = None,
         backend: Backend = PLATFORM,
+        timeouts: Timeouts = DEFAULT_TIMEOUTS,
+        patience: Patience = PATIENCE,
         archive: Archive | None = None,
     ) -> None:
         self.hub = hub
-        self._archive = archive
-        self._tasks: asyncio.TaskGroup | None = None
         self.trouble: LinkError | None = None
         """Why nothing can be heard at the moment; None while the scanner works."""
         self._make_wearable = make_wearable
         self._lineup = lineup
         self._wanted = None if wanted is None else frozenset(word.casefold() for word in wanted)
         self._backend = backend
-        self._devices: dict[str, Device] = {}
-        """By address."""
+        self._timeouts = timeouts
+        self._patience = patience
+        self._roster = Roster()
+        self._archive = archive
+        self._tasks: asyncio.TaskGroup | None = None
 
     @property
     def devices(self) -> list[Device]:
-        """Every device heard or connected since the start, in that order."""
-        return list(self._devices.values())
+        """Every device remembered, heard or connected, in that order."""
+        return self._roster.devices
 
     def device(self, key: str) -> Device:
         """Return the device with this id or address; UnknownDeviceError where there is none."""
-        for device in self._devices.values():
-            if key in {device.id, device.address}:
-                return device
-        raise UnknownDeviceError(key)
+        return self._roster.find(key)
+
+    def remember(self, device: Device) -> None:
+        """Take in a device of an earlier run, its session restored: lost until it is heard, wanted if it was.
+
+        ValueError where the device is known already.
+        """
+        self._roster.add(device)
+        device.keep = self._keep
+        if not device.wanted or not (device.asked or self._is_wanted(device.id, device.address, device.name)):
+            device.unwant()
 
     def connect(self, key: str) -> Device:
         """Want a device connected; it happens as soon as it is heard, without waiting for a back-off."""
@@ -103,38 +116,35 @@ class Supervisor:
     @property
     def _kept(self) -> Archive:
         if self._archive is None:
-            raise NotNowError("nothing is stored: start the service with --store")
+            raise NotNowError("nothing is stored by this service")
         return self._archive
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Go on with stored sessions, scan and connect while the context is open; leaving it closes every link."""
         async with asyncio.TaskGroup() as tasks:
-            keeping = [tasks.create_task(self._archive.keep_house(), name="house")] if self._archive else []
-            self._tasks = tasks
+            self._tasks, own = tasks, []
             if self._archive is not None:
                 for device in await self._archive.resume(self._make_wearable, self._lineup, self.hub):
-                    self._remember(device)
-            keeping.append(tasks.create_task(self._run(tasks), name="supervisor"))
+                    self.remember(device)
+                    device.begin_keeping()
+                own.append(tasks.create_task(self._archive.keep_house(), name="house"))
+            own.append(tasks.create_task(self._run(tasks), name="supervisor"))
             try:
                 yield
             finally:
-                for task in keeping:
-                    task.cancel()
-                await asyncio.gather(*(device.close() for device in self._devices.values()), return_exceptions=True)
                 self._tasks = None
+                for task in own:
+                    task.cancel()
+                await asyncio.gather(*(device.close() for device in self._roster.devices), return_exceptions=True)
 
-    def _remember(self, device: Device) -> None:
-        """Take a device into the table, and keep what its session tells."""
-        self._devices[device.address] = device
-        device.on_new_session = self._keep
-        self._keep(device)
-
-    def _keep(self, device: Device) -> None:
-        if self._tasks is not None:
-            device.keeping = self._tasks.create_task(device.session.keep(), name=f"keep {device.address}")
+    def _keep(self, session: Session) -> asyncio.Task[None]:
+        if self._tasks is None:
+            raise RuntimeError("the supervisor does not run")
+        return self._tasks.create_task(session.keep(), name="keep")
 
     async def _run(self, tasks: asyncio.TaskGroup) -> None:
+        await close_stale([device.address for device in self._roster.devices], self._backend)
         while True:
             try:
                 await self._connect(*await self._hear_one_due(), tasks)
@@ -151,7 +161,8 @@ class Supervisor:
         """Scan until a device is heard that should be connected now."""
         services = self._make_wearable().services
         while True:
-            async with scanning(services, self._backend) as sightings:
+            self._roster.forget()
+            async with scanning(services, self._backend, self._timeouts) as sightings:
                 self.trouble = None
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(SCAN_STRETCH_S):
@@ -160,22 +171,30 @@ class Supervisor:
                                 return device, sighting
 
     def _heard(self, sighting: Sighting) -> Device:
-        device = self._devices.get(sighting.address)
+        device = self._roster.at(sighting.address)
         if device is None:
-            wearable = self._make_wearable()
-            journal = Journal(self._archive.store) if self._archive else None
-            device = Device(
-                sighting.address, wearable, self._lineup, self.hub.publish, name=sighting.name, journal=journal
-            )
-            device.wanted = self._is_wanted(sighting)
-            self._remember(device)
-        device.heard(sighting, tell_every_s=SEEN_EVERY_S)
+            device = self._new(sighting.address, sighting.name, sighting.rssi_dbm)
+            device.wanted = self._is_wanted(sighting.address, sighting.name)
+            self._roster.add(device)
+        device.heard(sighting.name, sighting.rssi_dbm, tell_every_s=SEEN_EVERY_S)
         return device
 
-    def _is_wanted(self, sighting: Sighting) -> bool:
-        if self._wanted is None:
-            return True
-        return not self._wanted.isdisjoint({sighting.address.casefold(), (sighting.name or "").casefold()})
+    def _new(self, address: str, name: str | None = None, rssi_dbm: int | None = None) -> Device:
+        device = Device(
+            address=address,
+            name=name,
+            rssi_dbm=rssi_dbm,
+            wearable=self._make_wearable(),
+            lineup=self._lineup,
+            publish=self.hub.publish,
+            patience=self._patience,
+            journal=Journal(self._archive.store) if self._archive else None,
+        )
+        device.keep = self._keep
+        return device
+
+    def _is_wanted(self, *names: str | None) -> bool:
+        return self._wanted is None or not self._wanted.isdisjoint(name.casefold() for name in names if name)
 
     async def _connect(self, device: Device, sighting: Sighting, tasks: asyncio.TaskGroup) -> None:
         """Start the device's link task and wait until it is connected or has failed."""
@@ -185,7 +204,43 @@ class Supervisor:
             return
         settled = asyncio.Event()
         device.move(Cause.ATTEMPT)
-        link = BleLink(sighting.handle, device.wearable.handshake(), self._backend)
-        device.task = tasks.create_task(device.run(link, settled, random.random), name=f"link {device.address}")
+        link = BleLink(sighting.handle, device.wearable.handshake(), self._backend, self._timeouts)
+        device.task = tasks.create_task(self._hold(device, link, settled), name=f"link {device.address}")
         device.task.add_done_callback(lambda _: settled.set())
         await settled.wait()
+
+    async def _hold(self, device: Device, link: Link, settled: asyncio.Event) -> None:
+        """Hold a link until it is lost or its device no longer wanted; `settled` is set once it is connected."""
+        try:
+            async with link:
+                device = self._introduced(device, link)
+                if device.wanted:
+                    await device.run(link, settled.set)
+        except LinkError as error:
+            fault = error
+        except Exception as error:
+            logger.exception("link of %s", device.address)
+            fault = LinkError(LinkFault.REFUSED, f"an internal error: {error!r}")
+        else:
+            return
+        if device.task is asyncio.current_task():  # else it has another link by now
+            device.lost(fault)
+
+    def _introduced(self, device: Device, link: Link) -> Device:
+        """Return whose link it is, now that it told its id: the device dialled, or one known from elsewhere.
+
+        LinkError where that one is connected already.
+        """
+        owner = self._roster.owner(device, told_id(self._make_wearable(), link.said), self._new)
+        if owner is device:
+            return device
+        if owner.state in LINKED:
+            device.twin = owner
+            raise LinkError(LinkFault.TWIN, f"it calls itself {owner.id}, which is connected from {owner.address}")
+        logger.info("%s is at %s now, it was at %s", owner.id, device.address, owner.address)
+        owner.task, device.task = device.task, None
+        owner.wanted = owner.wanted or owner not in self._roster.devices
+        self._roster.hand_over(device, owner)
+        if owner.wanted:
+            owner.move(Cause.ATTEMPT)
+        return owner

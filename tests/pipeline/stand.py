@@ -34,8 +34,14 @@ class Stand:
         self.walker = Walker(schedule, seed=seed, sensors=sensors)
         self.bracelet = Bracelet(self.walker, device_id=device_id, packet_samples=10)
         self.told = []
-        address = f"{device_id}:address"
-        self.device = Device(address, wire.Bracelet(), lineup(counter, **options), self.told.append, name="Bracelet")
+        self.device = Device(
+            address=f"{device_id}:address",
+            name="Bracelet",
+            rssi_dbm=-50,
+            wearable=wire.Bracelet(),
+            lineup=lineup(counter, **options),
+            publish=self.told.append,
+        )
         self.device.wanted = True
         self._delay_ns = round(delay_s * 1e9)
         self.connect()
