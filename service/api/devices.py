@@ -80,7 +80,9 @@ def add_person_routes(app: FastAPI, supervisor: Supervisor, trials: Trials) -> N
         """
         await supervisor.assign(id, owner.person)
 
-    nobody = {404: {"model": models.Problem, "description": "Nobody of that name has data"}}
+    nobody: dict[int | str, dict[str, Any]] = {
+        404: {"model": models.Problem, "description": "Nobody of that name has data"}
+    }
 
     @app.delete("/api/v1/persons/{person}", tags=["persons"], responses={**nobody, **_NOT_STORED})
     async def forget(person: str) -> models.Forgotten:

@@ -131,9 +131,10 @@ class Archive:
         await self.store.assign(device.id, person)
 
     async def forget(self, person: str, devices: Iterable[Device]) -> tuple[int, list[Device]]:
-        """Delete all data of a person for good; return how many sessions were deleted, and the devices that were in use.
+        """Delete all data of a person for good; return how many sessions were deleted, and devices that were in use.
 
-        UnknownPersonError where there are none. Those are disconnected and left alone, and count from nothing when they are wanted again.
+        UnknownPersonError where there are none. Those devices are disconnected and left alone; they count from nothing
+        when they are wanted again.
         """
         owners = await self.store.read(lambda r: {one.key: one.person for one in r.sessions()})
         owned = await self.store.read(lambda r: {one.device for one in r.devices() if one.person == person})

@@ -45,10 +45,7 @@ EPHEMERAL = (Signal, Counting, Described, DeviceChanged)
 """Events of which only the newest matters: no ordinal, conflated for slow readers."""
 
 
-PRIVATE = (Gridded, Received, Heard)
-"""Events for observers and the journal only."""
-
-UNNUMBERED = (*EPHEMERAL, *PRIVATE, Tentative, Awaited)
+UNNUMBERED = (*EPHEMERAL, Gridded, Received, Heard, Tentative, Awaited)
 """Events without an ordinal, that no log keeps; a Tentative is queued like a durable one, for a retraction is news."""
 
 

@@ -17,8 +17,8 @@ from service.links.contract import Link
 from service.pipeline.journal import Journal, Standing
 from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
-from service.pipeline.notices import PRIVATE, UNNUMBERED, DeviceChanged, Notice, StateChanged, Told, entry_of
-from service.samples import Described, Event, Gap, Heard, Packet, Rebooted, Received, StepCounted, Tentative
+from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told, entry_of
+from service.samples import Described, Event, Gap, Gridded, Heard, Packet, Rebooted, Received, StepCounted, Tentative
 from service.signals.hosttime import HostClock
 from service.store.chunker import blocks
 from service.store.values import Chunk, Cursor, Description, Resumable, SessionKey
@@ -164,7 +164,7 @@ class Session:
 
     def tell(self, event: Told, at_ns: int, run: int | None = None) -> None:
         """Tell the observers, publish the event unless it is for them only, and have it stored if it is durable."""
-        private = isinstance(event, PRIVATE)
+        private = isinstance(event, Gridded)
         if private and not self.observers:
             return
         if isinstance(event, Described):
@@ -196,8 +196,10 @@ class Session:
             if isinstance(event, Received):
                 self._begin_journal()
                 self.journal.received(event, self.tracker.info, at_ns)
-            elif isinstance(event, Heard):
+                continue
+            if isinstance(event, Heard):
                 self.journal.heard(event, at_ns)
+                continue
             self.tell(event, self._host_ns(event, run), run)
         self._tell_faults()
 
@@ -223,8 +225,8 @@ class Session:
             await self._behind.wait()
             self._behind.clear()
             while self.tracker.has_work:
-                began_s = time.perf_counter()
-                while self.tracker.has_work and time.perf_counter() - began_s < SLICE_S:
+                until_s = time.perf_counter() + SLICE_S
+                while time.perf_counter() < until_s and self.tracker.has_work:
                     self._catch_up_a_slice()
                 await asyncio.sleep(0)
 

@@ -110,7 +110,7 @@ class Supervisor:
         await self._kept.assign(self.device(key), person)
 
     async def forget(self, person: str) -> tuple[int, list[Device]]:
-        """Delete all data of a person for good; return how many sessions were deleted, and whose devices were in use."""
+        """Delete all data of a person for good; return how many sessions were deleted, and devices that were in use."""
         return await self._kept.forget(person, self.devices)
 
     @property
