@@ -167,16 +167,16 @@ async def _serve_with(settings: Settings, backend: Backend, path: Path, *, wante
     from service.pipeline.archive import Archive, Keep  # noqa: PLC0415
     from service.store.store import open_store  # noqa: PLC0415
 
+    make_supervisor = _supervisor(settings, backend, wanted)
     keep = Keep(raw_days=settings.keep_raw_days, raw_mb=settings.keep_raw_mb, log_days=settings.keep_log_days)
-    bound = listen(settings.host, settings.port)
-    url = address(bound)
+    with contextlib.closing(listen(settings.host, settings.port)) as bound:
+        url = address(bound)
 
-    def ready() -> None:
-        say(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)")
+        def ready() -> None:
+            say(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)")
 
-    async with open_store(path, queue_batches=QUEUE_BATCHES) as store:
-        supervisor = _supervisor(settings, backend, wanted, Archive(store, keep))
-        await serve(create_app(supervisor), bound, on_ready=ready)
+        async with open_store(path, queue_batches=QUEUE_BATCHES) as store:
+            await serve(create_app(make_supervisor(Archive(store, keep))), bound, on_ready=ready)
 
 
 def _store_path(settings: Settings) -> Path:
@@ -200,16 +200,18 @@ async def _forget(options: argparse.Namespace) -> None:
     say(f"{sessions} sessions of {options.person} were deleted for good")
 
 
-def _supervisor(settings: Settings, backend: Backend, wanted: Sequence[str] | None, archive: Archive) -> Supervisor:
+def _supervisor(settings: Settings, backend: Backend, wanted: Sequence[str] | None) -> Callable[[Archive], Supervisor]:
+    """Return what makes the supervisor over a store; wrong options are refused now."""
     from service.pipeline.hub import Hub  # noqa: PLC0415
     from service.pipeline.lineup import lineup  # noqa: PLC0415
     from service.pipeline.supervisor import Supervisor  # noqa: PLC0415
     from service.wearables.bracelet import Bracelet  # noqa: PLC0415
 
-    return Supervisor(
+    counters = lineup(settings.counter, beside=settings.beside, preset=settings.preset, params=settings.param)
+    return lambda archive: Supervisor(
         hub=Hub(durable_limit=settings.durable_limit),
         make_wearable=Bracelet,
-        lineup=lineup(settings.counter, beside=settings.beside, preset=settings.preset, params=settings.param),
+        lineup=counters,
         wanted=wanted or None,
         backend=backend,
         archive=archive,
