@@ -131,9 +131,8 @@ class Session:
         self.journal.begin(found.key, found.about)
         if found.snapshot is not None:
             self.tracker.restore(found.snapshot.state["tracker"])
-            self._clocks = {
-                int(run): HostClock.restored(state) for run, state in found.snapshot.state["clocks"].items()
-            }
+            for run, state in found.snapshot.state["clocks"].items():
+                self._clock(int(run)).restore(state)
 
     def replay(self, item: Chunk | Description, counted: Cursor | None) -> None:
         """Count again what was stored; up to `counted` it was told before, and what is missing there is lost."""
@@ -227,10 +226,11 @@ class Session:
             while self.tracker.has_work:
                 until_s = time.perf_counter() + SLICE_S
                 while time.perf_counter() < until_s and self.tracker.has_work:
-                    self._catch_up_a_slice()
+                    self.catch_up()
                 await asyncio.sleep(0)
 
-    def _catch_up_a_slice(self) -> None:
+    def catch_up(self) -> None:
+        """Count again a slice of what late samples change."""
         run = self.tracker.cursor[0]
         events = self.tracker.catch_up()
         if self.tracker.cursor[0] != run:  # the new run's first packets have waited for the earlier one's last

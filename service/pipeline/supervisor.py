@@ -78,14 +78,13 @@ class Supervisor:
         return self._roster.find(key)
 
     def remember(self, device: Device) -> None:
-        """Take in a device of an earlier run, its session restored: lost until it is heard, wanted if it was.
+        """Take in a device of an earlier run, its session restored: it is wanted, and lost until it is heard.
 
         ValueError where the device is known already.
         """
         self._roster.add(device)
         device.keep = self._keep
-        if not device.wanted or not (device.asked or self._is_wanted(device.id, device.address, device.name)):
-            device.unwant()
+        device.wanted = True
 
     def connect(self, key: str) -> Device:
         """Want a device connected; it happens as soon as it is heard, without waiting for a back-off."""
@@ -126,8 +125,7 @@ class Supervisor:
             self._tasks, own = tasks, []
             if self._archive is not None:
                 for device in await self._archive.resume(self._make_wearable, self._lineup, self.hub):
-                    self.remember(device)
-                    device.begin_keeping()
+                    self._take_up(device)
                 own.append(tasks.create_task(self._archive.keep_house(), name="house"))
             own.append(tasks.create_task(self._run(tasks), name="supervisor"))
             try:
@@ -137,6 +135,14 @@ class Supervisor:
                 for task in own:
                     task.cancel()
                 await asyncio.gather(*(device.close() for device in self._roster.devices), return_exceptions=True)
+
+    def _take_up(self, device: Device) -> None:
+        """Go on with a stored session; its device is left alone where it was, or where others only are wanted now."""
+        is_wanted = device.wanted and (device.asked or self._is_wanted(device.id, device.address, device.name))
+        self.remember(device)
+        device.begin_keeping()
+        if not is_wanted:
+            device.unwant()
 
     def _keep(self, session: Session) -> asyncio.Task[None]:
         if self._tasks is None:
