@@ -28,7 +28,9 @@ class Settings:
     )
 
     store: str = option(
-        "", "database file that keeps steps, samples and sessions over restarts; empty: the user's data folder"
+        "",
+        "database file that keeps steps, samples and sessions over restarts; without it `serve` uses the user's data"
+        " folder, and `demo` one that goes when it ends",
     )
     keep_raw_days: float = option(
         30.0, "raw samples older than this are deleted; 0: never", unit="days", low=0.0, high=36_500.0
