@@ -1,4 +1,4 @@
-"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `evaluate`, `bench`, `counters`.
+"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `forget`, `evaluate`, `bench`, `counters`.
 
 Ctrl-C or SIGTERM ends each cleanly: with exit code 0 those that go on until they are told to end, with 130 or 143 those
 whose result is then missing. A wrong option, file or port ends a command with one line and exit code 2; no Bluetooth
@@ -15,25 +15,31 @@ import dataclasses
 import logging
 import signal
 import sys
-from collections.abc import Callable, Coroutine, Sequence
+import tempfile
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service import cli_evaluation, cli_options
 from service.cli_output import say, spell_out
 from service.cli_stop import Stopped, stopped_at_once, tell
 from service.config import Settings
-from service.errors import LinkError, ParameterError, SteplinkError
+from service.errors import LinkError, ParameterError, SteplinkError, UnknownPersonError
 
 if TYPE_CHECKING:
     from device_sim.bracelet import Bracelet
     from device_sim.gatt import GattBracelet
     from device_sim.source import Source
     from service.links.ble import Backend
+    from service.pipeline.archive import Archive
     from service.pipeline.supervisor import Supervisor
 
 USAGE_ERROR = 2
 NO_BLUETOOTH = 3
+STORE_NAME = "steplink.db"
+QUEUE_BATCHES = 4096
+"""Batches that may wait for the disk: four seconds of a thousand devices."""
 BOOT_NS = 50_000_000
 """A simulated bracelet that starts again later than this has another boot number."""
 
@@ -87,9 +93,18 @@ async def _demo(options: argparse.Namespace) -> None:
         ]
         central = await worn.enter_async_context(air.central())
         backend = Backend(scanner=central.scanner, client=central.client)
-        await _side_by_side(
-            _serve_with(settings, _supervisor(settings, backend, wanted=None)), *(_take_off(one) for one in played)
-        )
+        path = worn.enter_context(_demo_store(settings))
+        await _side_by_side(_serve_with(settings, backend, path), *(_take_off(one) for one in played))
+
+
+@contextlib.contextmanager
+def _demo_store(settings: Settings) -> Iterator[Path]:
+    """Yield where a demo stores: in a folder that goes with it, unless a file is named."""
+    if settings.store:
+        yield Path(settings.store)
+        return
+    with tempfile.TemporaryDirectory(prefix="steplink-") as folder:
+        yield Path(folder) / STORE_NAME
 
 
 async def _side_by_side(*works: Coroutine[Any, Any, None]) -> None:
@@ -116,7 +131,7 @@ async def _serve(options: argparse.Namespace) -> None:
     """Run the service, over this machine's Bluetooth or a virtual air."""
     settings = _settings(options)
     async with _backend(options.air) as backend:
-        await _serve_with(settings, _supervisor(settings, backend, wanted=options.connect))
+        await _serve_with(settings, backend, _store_path(settings), wanted=options.connect)
 
 
 async def _scan(options: argparse.Namespace) -> None:
@@ -146,31 +161,60 @@ async def _sim(options: argparse.Namespace) -> None:
         say("the recording has been played")
 
 
-async def _serve_with(settings: Settings, supervisor: Supervisor) -> None:
+async def _serve_with(settings: Settings, backend: Backend, path: Path, *, wanted: Sequence[str] | None = None) -> None:
     from service.api.app import create_app  # noqa: PLC0415
     from service.api.server import address, listen, serve  # noqa: PLC0415
+    from service.pipeline.archive import Archive, Keep  # noqa: PLC0415
+    from service.store.store import open_store  # noqa: PLC0415
 
-    bound = listen(settings.host, settings.port)
-    url = address(bound)
+    make_supervisor = _supervisor(settings, backend, wanted)
+    keep = Keep(raw_days=settings.keep_raw_days, raw_mb=settings.keep_raw_mb, log_days=settings.keep_log_days)
+    with contextlib.closing(listen(settings.host, settings.port)) as bound:
+        url = address(bound)
 
-    def ready() -> None:
-        say(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)")
+        def ready() -> None:
+            say(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)")
 
-    await serve(create_app(supervisor), bound, on_ready=ready)
+        async with open_store(path, queue_batches=QUEUE_BATCHES) as store:
+            await serve(create_app(make_supervisor(Archive(store, keep))), bound, on_ready=ready)
 
 
-def _supervisor(settings: Settings, backend: Backend, wanted: Sequence[str] | None) -> Supervisor:
+def _store_path(settings: Settings) -> Path:
+    """Return where the service stores: the file that is named, or one in the user's data folder."""
+    from platformdirs import user_data_path  # noqa: PLC0415
+
+    return Path(settings.store) if settings.store else user_data_path("steplink", appauthor=False) / STORE_NAME
+
+
+async def _forget(options: argparse.Namespace) -> None:
+    """Delete a person's data, while no service runs on the store."""
+    from service.store.store import open_store  # noqa: PLC0415
+
+    path = Path(options.store) if options.store else _store_path(Settings())
+    if not path.exists():
+        raise ParameterError("store", str(path), "there is no such file")
+    async with open_store(path, queue_batches=1) as store:
+        sessions = await store.forget(options.person)
+    if not sessions:
+        raise UnknownPersonError(options.person)
+    say(f"{sessions} sessions of {options.person} were deleted for good")
+
+
+def _supervisor(settings: Settings, backend: Backend, wanted: Sequence[str] | None) -> Callable[[Archive], Supervisor]:
+    """Return what makes the supervisor over a store; wrong options are refused now."""
     from service.pipeline.hub import Hub  # noqa: PLC0415
     from service.pipeline.lineup import lineup  # noqa: PLC0415
     from service.pipeline.supervisor import Supervisor  # noqa: PLC0415
     from service.wearables.bracelet import Bracelet  # noqa: PLC0415
 
-    return Supervisor(
+    counters = lineup(settings.counter, beside=settings.beside, preset=settings.preset, params=settings.param)
+    return lambda archive: Supervisor(
         hub=Hub(durable_limit=settings.durable_limit),
         make_wearable=Bracelet,
-        lineup=lineup(settings.counter, beside=settings.beside, preset=settings.preset, params=settings.param),
+        lineup=counters,
         wanted=wanted or None,
         backend=backend,
+        archive=archive,
     )
 
 
@@ -287,6 +331,9 @@ def _parser() -> argparse.ArgumentParser:
         help=f"where its radio is (default {cli_options.DEFAULT_AIR})",
     )
     cli_options.add_bracelet(sim)
+    forget = _command(commands, "forget", _forget, "delete all data of a person from the store, for good")
+    forget.add_argument("person", metavar="PERSON", help="whose: as named by PUT /api/v1/devices/{id}/person")
+    forget.add_argument("--store", metavar="FILE", help="the database (default: as of `serve`); no service may use it")
     evaluate = _command(
         commands, "evaluate", cli_evaluation.evaluate, "count recordings and compare with their true steps"
     )

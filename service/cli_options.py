@@ -42,7 +42,8 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
             action="append" if repeated else "store",
             default=[] if repeated else field.default,
             metavar=(meta["unit"] or "TEXT").upper(),
-            help=f"{meta['text']}{span} (default {'none' if repeated else field.default})",
+            help=f"{meta['text']}{span}"
+            + ("" if field.default == "" else f" (default {'none' if repeated else field.default})"),
         )
 
 

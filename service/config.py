@@ -27,6 +27,25 @@ class Settings:
         1000, "events that may wait for a slow reader before it is closed", unit="events", low=10, high=100_000
     )
 
+    store: str = option(
+        "",
+        "database file that keeps steps, samples and sessions over restarts; without it `serve` uses the user's data"
+        " folder, and `demo` one that goes when it ends",
+    )
+    keep_raw_days: float = option(
+        30.0, "raw samples older than this are deleted; 0: never", unit="days", low=0.0, high=36_500.0
+    )
+    keep_raw_mb: float = option(
+        10_000.0,
+        "raw samples are deleted, oldest first, while the database is larger than this; 0: never",
+        unit="MB",
+        low=0.0,
+        high=1e9,
+    )
+    keep_log_days: float = option(
+        0.0, "steps and events older than this are deleted, counts stay; 0: never", unit="days", low=0.0, high=36_500.0
+    )
+
     def __post_init__(self) -> None:
         """Check ranges, and that nobody else can reach an interface without access control."""
         for name, spec in self.__dataclass_fields__.items():

@@ -11,6 +11,7 @@
     ├── LearningError       a walk from which a counter's parameters cannot be learnt
     ├── NotNowError         what was asked for is possible, but not at this moment
     ├── UnknownDeviceError  no device of that id
+    ├── UnknownPersonError  nobody of that name has data
     └── UnknownNumberError  no calibration or trial of that number
 
 Each carries typed fields and a sentence that says what to do. None of them ends a stream: bad input is counted
@@ -101,6 +102,7 @@ class StoreFault(StrEnum):
     READ_ONLY = "read_only"
     IO = "io"
     LOCKED = "locked"
+    IN_USE = "in_use"
     BUSY = "busy"
     CLOSED = "closed"
     CORRUPT = "corrupt"
@@ -142,6 +144,14 @@ class UnknownDeviceError(SteplinkError):
     def __init__(self, device: str) -> None:
         super().__init__(f"no device {device!r}: GET /api/v1/devices lists the known ones")
         self.device = device
+
+
+class UnknownPersonError(SteplinkError):
+    """Nobody of that name has data."""
+
+    def __init__(self, person: str) -> None:
+        super().__init__(f"no data of {person!r}: names are told apart by case")
+        self.person = person
 
 
 class UnknownNumberError(SteplinkError):

@@ -163,6 +163,8 @@ class DeviceInfo:
     boot: int | None = None
     rate_hz: float | None = None
     lsb_per_g: float | None = None
+    lsb_per_rad_s: float | None = None
+    lsb_per_ut: float | None = None
     battery_percent: int | None = None
     clock: tuple[int, int] | None = None
     """(sample index, full tick at that sample): tells the high bits of the tick once a connection."""

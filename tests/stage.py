@@ -2,7 +2,9 @@
 
 import asyncio
 import contextlib
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import httpx
 import websockets
@@ -13,9 +15,11 @@ from service.api.app import create_app
 from service.api.server import address, listen, serve
 from service.counters.registry import DEFAULT, make
 from service.links.ble import Backend
+from service.pipeline.archive import Archive
 from service.pipeline.hub import Hub
 from service.pipeline.lineup import lineup
 from service.pipeline.supervisor import Supervisor
+from service.store.store import open_store
 from service.tracking.tracker import Tracker
 from service.wearables.bracelet import Bracelet as Protocol
 
@@ -61,11 +65,26 @@ def default_tracker(wearable):
 
 
 @contextlib.asynccontextmanager
-async def staged(bracelet, *others, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), **radio):
+async def staged(bracelet, *others, **options):
     """Run the service over bracelets on a local air; everything is closed and joined at the end."""
+    radio = {name: value for name, value in options.items() if name not in SERVICE}
     async with contextlib.AsyncExitStack() as stack:
         air = await stack.enter_async_context(LocalAir())
         gatts = [await stack.enter_async_context(air.bracelet(worn, **radio)) for worn in (bracelet, *others)]
+        service = {name: value for name, value in options.items() if name in SERVICE}
+        yield await stack.enter_async_context(serving(air, gatts, **service))
+
+
+SERVICE = {"durable_limit", "wanted", "counter", "beside", "path", "keep"}
+"""Options that are the service's and not the bracelet's radio's."""
+
+
+@contextlib.asynccontextmanager
+async def serving(air, gatts=(), *, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), path=None, keep=None):
+    """Run the service over an air that is there; it stores at `path`, else where nobody looks."""
+    async with contextlib.AsyncExitStack() as stack:
+        folder = stack.enter_context(tempfile.TemporaryDirectory())
+        store = await stack.enter_async_context(open_store(path or Path(folder) / "s.db", queue_batches=100))
         central = await stack.enter_async_context(air.central())
         supervisor = Supervisor(
             hub=Hub(durable_limit=durable_limit),
@@ -73,6 +92,7 @@ async def staged(bracelet, *others, durable_limit=1000, wanted=None, counter=DEF
             lineup=lineup(counter, beside=beside),
             wanted=wanted,
             backend=Backend(scanner=central.scanner, client=central.client),
+            archive=Archive(store, keep),
         )
         bound = listen("127.0.0.1", 0)
         url, ready = address(bound), asyncio.Event()
@@ -81,7 +101,7 @@ async def staged(bracelet, *others, durable_limit=1000, wanted=None, counter=DEF
             async with asyncio.timeout(10):
                 await ready.wait()
             async with httpx.AsyncClient(base_url=url, trust_env=False) as http:
-                yield Stage(url, http, supervisor, gatts[0], gatts)
+                yield Stage(url, http, supervisor, gatts[0] if gatts else None, list(gatts))
         finally:
             server.cancel()
             await asyncio.gather(server, return_exceptions=True)

@@ -17,13 +17,21 @@ from pydantic import TypeAdapter
 
 from service.api import models
 from service.api.calibrations import add_calibration_routes
-from service.api.devices import add_counter_routes, add_device_routes
+from service.api.devices import add_counter_routes, add_device_routes, add_person_routes
 from service.api.guard import Guard
 from service.api.guide import add_guide
 from service.api.live import serve_feed
 from service.api.trials import add_trial_routes
 from service.config import LOOPBACK
-from service.errors import CounterError, NotNowError, ParameterError, UnknownDeviceError, UnknownNumberError
+from service.errors import (
+    CounterError,
+    NotNowError,
+    ParameterError,
+    StoreError,
+    UnknownDeviceError,
+    UnknownNumberError,
+    UnknownPersonError,
+)
 from service.pipeline.supervisor import Supervisor
 from service.pipeline.trials import Trials
 
@@ -57,12 +65,15 @@ def create_app(supervisor: Supervisor, trials: Trials | None = None) -> FastAPI:
         middleware=[Middleware(Guard, hosts=frozenset(LOOPBACK))],
     )
     app.add_exception_handler(RequestValidationError, _invalid)
+    app.add_exception_handler(StoreError, _not_stored)
     for fault, status in _REFUSALS.items():
         app.add_exception_handler(fault, _refusal(status))
+    walks = trials or Trials()
     add_device_routes(app, supervisor)
     add_counter_routes(app, supervisor)
+    add_person_routes(app, supervisor, walks)
     add_calibration_routes(app, supervisor)
-    add_trial_routes(app, supervisor, trials or Trials())
+    add_trial_routes(app, supervisor, walks)
     _add_live(app, supervisor)
     _add_page(app)
     add_guide(app)
@@ -72,6 +83,7 @@ def create_app(supervisor: Supervisor, trials: Trials | None = None) -> FastAPI:
 _REFUSALS: dict[type[Exception], int] = {
     UnknownDeviceError: 404,
     UnknownNumberError: 404,
+    UnknownPersonError: 404,
     NotNowError: 409,
     ParameterError: 422,
     CounterError: 422,
@@ -83,6 +95,12 @@ def _refusal(status: int) -> Callable[[Request, Exception], Awaitable[JSONRespon
         return JSONResponse({"detail": str(error)}, status_code=status)
 
     return answer
+
+
+async def _not_stored(_request: Request, error: Exception) -> JSONResponse:
+    """Say what the disk does not do: 503 where it may do it later."""
+    passing = isinstance(error, StoreError) and error.is_passing
+    return JSONResponse({"detail": str(error)}, status_code=503 if passing else 500)
 
 
 async def _invalid(_request: Request, error: Exception) -> JSONResponse:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import FastAPI, Query
+from fastapi import FastAPI, Query, Response
 
 from service.api import models
 from service.api.steps import StepsQuery, list_page
@@ -12,8 +12,12 @@ from service.api.views import counter_view, device_view, lineup_view
 from service.counters import registry
 from service.pipeline.lineup import CounterChoice, Lineup
 from service.pipeline.supervisor import Supervisor
+from service.pipeline.trials import Trials
 
 _UNKNOWN: dict[int | str, dict[str, Any]] = {404: {"model": models.Problem, "description": "No device of that id"}}
+_NOT_STORED: dict[int | str, dict[str, Any]] = {
+    503: {"model": models.Problem, "description": "The disk does not take or give it now; it may later"}
+}
 
 
 def add_device_routes(app: FastAPI, supervisor: Supervisor) -> None:
@@ -22,13 +26,22 @@ def add_device_routes(app: FastAPI, supervisor: Supervisor) -> None:
     @app.get("/healthz", tags=["service"])
     async def health() -> models.Health:
         """Tell that the service runs, and whether Bluetooth does."""
-        trouble = supervisor.trouble
+        trouble, store = supervisor.trouble, supervisor.store_trouble
         return models.Health(
             version=app.version,
             devices=len(supervisor.devices),
             bluetooth="ok" if trouble is None else "unavailable",
             reason=None if trouble is None else trouble.why,
+            store="ok" if store is None else "unavailable",
+            store_reason=None if store is None else store.why,
         )
+
+    @app.get("/readyz", tags=["service"], responses={503: {"model": models.Readiness, "description": "Not ready"}})
+    async def ready(answer: Response) -> models.Readiness:
+        """Tell whether devices can be heard and what is counted can be stored; if not, with status 503 and why."""
+        troubles = [trouble for trouble in (supervisor.trouble, supervisor.store_trouble) if trouble is not None]
+        answer.status_code = 503 if troubles else 200
+        return models.Readiness(ready=not troubles, reasons=[trouble.why for trouble in troubles])
 
     @app.get("/api/v1/devices", tags=["devices"])
     async def list_devices() -> models.Page[models.Device]:
@@ -50,10 +63,36 @@ def add_device_routes(app: FastAPI, supervisor: Supervisor) -> None:
         """Close a device's connection and leave it alone; its count stays."""
         return device_view(supervisor.disconnect(id))
 
-    @app.get("/api/v1/devices/{id}/steps", tags=["devices"], responses=_UNKNOWN)
+    @app.get("/api/v1/devices/{id}/steps", tags=["devices"], responses={**_UNKNOWN, **_NOT_STORED})
     async def list_steps(id: str, query: Annotated[StepsQuery, Query()]) -> models.Page[models.StepEvent]:  # noqa: A002
         """List a device's confirmed steps, oldest first."""
-        return list_page(supervisor.device(id), query)
+        return await list_page(supervisor.device(id), query)
+
+
+def add_person_routes(app: FastAPI, supervisor: Supervisor, trials: Trials) -> None:
+    """Add the routes of whose data is whose to `app`."""
+
+    @app.put("/api/v1/devices/{id}/person", tags=["persons"], status_code=204, responses={**_UNKNOWN, **_NOT_STORED})
+    async def assign(id: str, owner: models.OwnerModel) -> None:  # noqa: A002
+        """Make a person the owner of a device's data: of those that are nobody's and of those to come.
+
+        Where the session is another person's it ends, and one that counts from nothing begins.
+        """
+        await supervisor.assign(id, owner.person)
+
+    nobody: dict[int | str, dict[str, Any]] = {
+        404: {"model": models.Problem, "description": "Nobody of that name has data"}
+    }
+
+    @app.delete("/api/v1/persons/{person}", tags=["persons"], responses={**nobody, **_NOT_STORED})
+    async def forget(person: str) -> models.Forgotten:
+        """Delete all data of a person for good: samples, steps, events and counts of every device of theirs.
+
+        The devices are disconnected, and count from nothing when they are connected again.
+        """
+        sessions, devices = await supervisor.forget(person)
+        trials.forget(device.id for device in devices)
+        return models.Forgotten(sessions=sessions)
 
 
 def add_counter_routes(app: FastAPI, supervisor: Supervisor) -> None:

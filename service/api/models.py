@@ -63,8 +63,12 @@ class Device(BaseModel):
     packets: int
     packets_bad: int = Field(description="Packets that broke the format; skipped")
     packets_duplicate: int = Field(description="Packets that held nothing new; skipped")
+    packets_reordered: int = Field(description="Packets that came behind later ones; put in their place")
     samples: int
-    samples_lost: int = Field(description="Samples that did not arrive")
+    samples_awaited: int = Field(
+        description="Samples that did not arrive and are asked for again: what is behind them is in `steps_now` only"
+    )
+    samples_lost: int = Field(description="Samples that did not arrive and will not")
     samples_saturated: int = Field(description="Samples with a value at its limit, counted: the true one is unknown")
     gaps: int
     reboots: int
@@ -137,8 +141,31 @@ class StateEvent(_Durable):
     reason: str | None
 
 
+class CorrectionEvent(_Durable):
+    """Samples came late, and what was told behind them has been counted again: by how much that changed it."""
+
+    type: Literal["correction"] = "correction"
+    boot: int
+    from_s: float
+    to_s: float
+    removed: int = Field(description="Steps told as likely that are none", examples=[1])
+    added: int = Field(description="Steps that had not been told", examples=[2])
+
+
+class AwaitedEvent(_Event):
+    """Samples did not arrive and are asked for again; a gap or a correction follows, or nothing where none was needed.
+
+    Until then what comes behind them is tentative: it is in `steps_now`, not in `steps`. It has no ordinal.
+    """
+
+    type: Literal["awaited"] = "awaited"
+    from_s: float
+    to_s: float
+    samples: int
+
+
 class GapEvent(_Durable):
-    """Samples did not arrive. Filled gaps (up to 0.6 s) were interpolated; no step lies inside others."""
+    """Samples did not arrive and will not. Filled gaps (up to 0.6 s) were interpolated; no step lies inside others."""
 
     type: Literal["gap"] = "gap"
     from_s: float
@@ -219,6 +246,8 @@ LiveMessage = Annotated[
     | TentativeEvent
     | StateEvent
     | GapEvent
+    | CorrectionEvent
+    | AwaitedEvent
     | RebootEvent
     | SegmentEvent
     | SignalEvent
@@ -228,7 +257,9 @@ LiveMessage = Annotated[
     | Lagging,
     Field(discriminator="type"),
 ]
-DurableEvent = Annotated[StepEvent | StateEvent | GapEvent | RebootEvent | SegmentEvent, Field(discriminator="type")]
+DurableEvent = Annotated[
+    StepEvent | StateEvent | GapEvent | CorrectionEvent | RebootEvent | SegmentEvent, Field(discriminator="type")
+]
 
 
 class ParameterModel(BaseModel):
@@ -279,14 +310,39 @@ class LineupModel(BaseModel):
     counters: list[ChoiceModel] = Field(min_length=1, max_length=16)
 
 
+class OwnerModel(BaseModel):
+    """Whose data a device's are."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    person: str = Field(
+        min_length=1, max_length=80, pattern=r"^[^/\x00-\x1f]+$", description="A name or a pseudonym", examples=["P07"]
+    )
+
+
+class Forgotten(BaseModel):
+    """What was deleted."""
+
+    sessions: int = Field(description="Sessions whose samples, steps and events are gone for good")
+
+
+class Readiness(BaseModel):
+    """Whether everything works that should, and what does not."""
+
+    ready: bool
+    reasons: list[str] = Field(description="A sentence for each thing that does not work, and what to do")
+
+
 class Health(BaseModel):
-    """That the service runs, and whether it can hear devices."""
+    """That the service runs, whether it can hear devices, and whether what it counts is stored."""
 
     status: Literal["ok"] = "ok"
     version: str = Field(examples=["0.1.0"])
     devices: int
     bluetooth: Literal["ok", "unavailable"]
     reason: str | None = Field(description="Why nothing can be heard, and what to do")
+    store: Literal["ok", "unavailable"]
+    store_reason: str | None = Field(description="Why nothing is stored; counting goes on and is stored later")
 
 
 class Problem(BaseModel):

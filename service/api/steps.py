@@ -7,10 +7,13 @@ from datetime import datetime
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.api import models
-from service.api.views import step_view, utc
+from service.api.views import nanoseconds, step_view
+from service.counters import registry
 from service.errors import ParameterError
 from service.pipeline.device import Device
-from service.samples import StepCounted
+from service.pipeline.notices import notice_of
+from service.store.codec import STEP
+from service.store.values import LogQuery
 
 PAGE_LIMIT = 1000
 """Most items of one page."""
@@ -35,26 +38,25 @@ class StepsQuery(BaseModel):
     limit: int = Field(default=100, ge=1, le=PAGE_LIMIT, description=f"Most steps of one page, 1–{PAGE_LIMIT}")
 
 
-def list_page(device: Device, query: StepsQuery) -> models.Page[models.StepEvent]:
+async def list_page(device: Device, query: StepsQuery) -> models.Page[models.StepEvent]:
     """Return the page of a device's steps that `query` asks for; ParameterError where it makes no sense."""
     for name, moment in (("from", query.from_), ("to", query.to)):
         if moment is not None and moment.tzinfo is None:
             raise ParameterError(name, moment.isoformat(), "a time with an offset, as 2026-01-02T03:04:05Z")
-    last = _ordinal(query.after, device) if query.after else 0
-    if query.counter is not None and query.counter not in device.session.tracker.steps:
-        known = ", ".join(device.session.tracker.steps)
-        raise ParameterError("counter", query.counter, f"this device has {known}")
-    found = [
-        notice
-        for notice in device.session.steps()
-        if (notice.ordinal or 0) > last
-        and (query.from_ is None or utc(notice.at_ns) >= query.from_)
-        and (query.to is None or utc(notice.at_ns) < query.to)
-        and (query.counter is None or (isinstance(notice.event, StepCounted) and notice.event.counter == query.counter))
-    ]
-    items = [step_view(notice) for notice in found[: query.limit]]
-    more = len(found) > query.limit
-    return models.Page(items=items, next=f"{device.id}:{items[-1].ordinal}" if more else None)
+    if query.counter is not None and query.counter not in registry.COUNTERS:
+        raise ParameterError("counter", query.counter, f"one of {', '.join(registry.COUNTERS)}")
+    asked = LogQuery(
+        device=device.id,
+        after=_ordinal(query.after, device) if query.after else 0,
+        from_ns=None if query.from_ is None else nanoseconds(query.from_),
+        to_ns=None if query.to is None else nanoseconds(query.to),
+        kinds=frozenset({STEP}),
+        counter=query.counter,
+        limit=query.limit,
+    )
+    page = await device.session.journal.page(asked)
+    items = [step_view(notice_of(entry, device.id)) for entry in page.entries]
+    return models.Page(items=items, next=None if page.next_after is None else f"{device.id}:{page.next_after}")
 
 
 def _ordinal(cursor: str, device: Device) -> int:

@@ -14,7 +14,18 @@ from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged, Notice, StateChanged
 from service.pipeline.supervisor import Supervisor
-from service.samples import Band, Counting, Gap, Rebooted, Segmented, Signal, StepCounted, Tentative
+from service.samples import (
+    Awaited,
+    Band,
+    Corrected,
+    Counting,
+    Gap,
+    Rebooted,
+    Segmented,
+    Signal,
+    StepCounted,
+    Tentative,
+)
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SIGNAL_DIGITS = 4
@@ -24,6 +35,11 @@ _SIGNAL_DIGITS = 4
 def utc(at_ns: int) -> datetime:
     """Return host nanoseconds as a UTC time; to the microsecond, without the rounding of a float."""
     return _EPOCH + timedelta(microseconds=at_ns // 1000)
+
+
+def nanoseconds(moment: datetime) -> int:
+    """Return a time with an offset as host nanoseconds; exact."""
+    return (moment - _EPOCH) // timedelta(microseconds=1) * 1000
 
 
 def device_view(device: Device) -> models.Device:
@@ -52,7 +68,9 @@ def device_view(device: Device) -> models.Device:
         packets=tally.packets,
         packets_bad=tally.packets_bad,
         packets_duplicate=tally.packets_duplicate,
+        packets_reordered=tally.packets_reordered,
         samples=tally.samples,
+        samples_awaited=tally.samples_awaited,
         samples_lost=tally.samples_lost,
         samples_saturated=tally.samples_saturated,
         gaps=tally.gaps,
@@ -70,6 +88,11 @@ def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:
         return models.DeviceEvent(device=notice.device, at=utc(notice.at_ns), value=value)
     if isinstance(notice.event, Tentative):
         return _tentative_view(notice, notice.event)
+    if isinstance(notice.event, Awaited):
+        told = notice.event
+        return models.AwaitedEvent(
+            device=notice.device, at=utc(notice.at_ns), from_s=told.from_s, to_s=told.to_s, samples=told.samples
+        )
     if isinstance(notice.event, Signal | Counting):
         return _ephemeral_view(notice, notice.event)
     return durable_view(notice)
@@ -93,6 +116,8 @@ def durable_view(notice: Notice) -> models.DurableEvent:
                 samples=event.samples,
                 filled=event.filled,
             )
+        case Corrected():
+            return models.CorrectionEvent(device=device, at=at, ordinal=ordinal, **dataclasses.asdict(event))
         case Rebooted(boot=boot, previous=previous):
             return models.RebootEvent(device=device, at=at, ordinal=ordinal, boot=boot, previous=previous)
         case Segmented(primary=primary, steps=steps):

@@ -48,6 +48,11 @@ class Calibrations:
         self._session.observers.append(self._hear)
         return begun
 
+    def leave(self) -> None:
+        """Listen to the session no more."""
+        if self._hear in self._session.observers:
+            self._session.observers.remove(self._hear)
+
     def finish(self, number: int) -> Calibration:
         """End a recording with what is there."""
         ended = self.get(number)

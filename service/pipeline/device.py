@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import random
 import time
 from collections.abc import Callable
@@ -12,13 +13,17 @@ from service.errors import CounterError, LinkError, LinkFault, NotNowError
 from service.links.contract import Link
 from service.pipeline.calibration import Calibration, Plan
 from service.pipeline.calibrations import Calibrations
+from service.pipeline.journal import Journal
 from service.pipeline.lifecycle import LINKED, PATIENCE, WAITING, Cause, Patience, Standing, State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Publish, Session
+from service.store.values import Resumable
+from service.tracking.backfill import BackfillTracker
 from service.tracking.fitness import why_not
-from service.tracking.tracker import Tracker
 from service.wearables.contract import Wearable
+
+logger = logging.getLogger(__name__)
 
 TWIN_WAIT_S = 300.0
 """Wait before a device is tried again that calls itself by the name of one which is connected."""
@@ -42,14 +47,17 @@ class Device:
         lineup: Lineup,
         publish: Publish,
         patience: Patience = PATIENCE,
+        journal: Journal | None = None,
     ) -> None:
         self.address = address
         self.name = name
         self.rssi_dbm = rssi_dbm
         self.wearable = wearable
         self.lineup = lineup
-        tracker = Tracker(wearable, lineup.makers, primary=lineup.primary)
-        self.session = Session(lambda: self.id, tracker, publish)
+        self._told_lineup = lineup.plain()
+        """As the service was told to count when the session began."""
+        self._publish = publish
+        self.session = self._new_session(journal)
         self.calibrations = Calibrations(self.session)
         self.reason: str | None = UNHEARD if rssi_dbm is None else None
         self.since_ns = time.time_ns()
@@ -59,12 +67,65 @@ class Device:
         self.twin: Device | None = None
         """The connected device for whose sake this one was turned away."""
         self.task: asyncio.Task[None] | None = None
+        self.keep: Callable[[Session], asyncio.Task[None]] | None = None
+        """Begins to keep what a session tells, from the first link on; None where nothing is stored."""
+        self._keeping: asyncio.Task[None] | None = None
         self._patience = patience
         self._standing = Standing(state=State.LOST if rssi_dbm is None else State.SEEN)
         self._fault: LinkFault | None = None
         """Why the last attempt failed or the last link was lost."""
         self._moved_s = self._heard_s = time.monotonic()
         self._told_s = 0.0
+
+    @classmethod
+    def restored(cls, found: Resumable, wearable: Wearable, publish: Publish, journal: Journal) -> Device:
+        """Return the device of a stored session as its last snapshot has it; what was stored since is to be replayed.
+
+        SnapshotError, CounterError, ParameterError or KeyError where the session cannot go on.
+        """
+        about = found.about or {}
+        device = cls(
+            address=about["address"],
+            name=about["name"],
+            wearable=wearable,
+            lineup=Lineup.from_plain(about["lineup"]),
+            publish=publish,
+            journal=journal,
+        )
+        device._told_lineup = about["told_lineup"]
+        device.wanted, device.asked = about["wanted"], about["asked"]
+        device.session.resume(found)
+        return device
+
+    def obey(self, lineup: Lineup) -> None:
+        """Count as the service is told to now, if that is not what it was told when the session began."""
+        if self._told_lineup == lineup.plain():
+            return
+        self._told_lineup = lineup.plain()
+        try:
+            self.count_with(lineup)
+        except CounterError as error:
+            logger.warning("%s goes on with its counters: %s", self.id, error)
+
+    def begin_keeping(self) -> None:
+        """Have what the session tells stored, from now on."""
+        if self._keeping is None and self.keep is not None:
+            self._keeping = self.keep(self.session)
+
+    def _new_session(self, journal: Journal | None) -> Session:
+        tracker = BackfillTracker(self.wearable, self.lineup.makers, primary=self.lineup.primary)
+        return Session(lambda: self.id, tracker, self._publish, journal, self._about, self.wearable.history)
+
+    def _about(self) -> dict[str, object]:
+        """Return what a restart needs beside the count, as plain data."""
+        return {
+            "address": self.address,
+            "name": self.name,
+            "wanted": self.wanted,
+            "asked": self.asked,
+            "lineup": self.lineup.plain(),
+            "told_lineup": self._told_lineup,
+        }
 
     @property
     def id(self) -> str:
@@ -101,8 +162,12 @@ class Device:
     def count_with(self, lineup: Lineup) -> None:
         """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
         registry.require_sensors(lineup.primary, self.session.tracker.info.sensors)
-        self.session.change_counters(lineup)
-        self.lineup = lineup
+        before, self.lineup = self.lineup, lineup
+        try:
+            self.session.change_counters(lineup)
+        except Exception:
+            self.lineup = before
+            raise
 
     def require_streaming(self) -> None:
         """Raise NotNowError unless the device streams."""
@@ -163,11 +228,51 @@ class Device:
         if self.task is not None:
             self.task.cancel()
 
+    async def close(self) -> None:
+        """Close its link, and store what is not stored yet."""
+        await self._rest()
+        await self.session.close()
+
+    async def end_session(self) -> None:
+        """End the session and begin another that counts from nothing; a wanted device is connected again by itself."""
+        wanted = self.wanted
+        await self._rest()
+        await self.session.close(ended=True)
+        self._begin_anew()
+        if wanted:
+            self.want()
+
+    async def drop_session(self) -> None:
+        """Leave the device alone, keep nothing of its session, and begin another that counts from nothing."""
+        if self.wanted:
+            self.unwant()
+        await self._rest()
+        self.session.journal.drop()
+        self._begin_anew()
+
+    async def _rest(self) -> None:
+        """Close its link and stop storing; return when both have ended."""
+        self.stop()
+        for task in (self.task, self._keeping):
+            if task is not None:
+                task.cancel()
+                await asyncio.wait({task})
+        self._keeping = None
+
+    def _begin_anew(self) -> None:
+        self.calibrations.leave()
+        before = self.session
+        self.session = self._new_session(before.journal.successor())
+        self.session.take_over(before)
+        self.calibrations = Calibrations(self.session)
+        self.describe()
+
     async def run(self, link: Link, on_connected: Callable[[], None]) -> None:
         """Follow an open link until it is lost (LinkError) or the task is cancelled."""
         self.move(Cause.CONNECTED)
         self.twin = None
         on_connected()
+        self.begin_keeping()
         await self.session.follow(link)
 
     def lost(self, error: LinkError) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from service.counters import registry
 from service.counters.contract import StepCounter
@@ -55,6 +56,19 @@ class Lineup:
         if name not in self.makers:
             return Lineup(choices=(*self.choices, changed))
         return Lineup(choices=tuple(changed if choice.name == name else choice for choice in self.choices))
+
+    def plain(self) -> list[dict[str, object]]:
+        """Return it as plain data, to be kept."""
+        return [{"name": one.name, "preset": one.preset, "params": dict(one.overrides)} for one in self.choices]
+
+    @classmethod
+    def from_plain(cls, choices: Sequence[Mapping[str, Any]]) -> Lineup:
+        """Return what `plain` returned; CounterError or ParameterError where this steplink knows it no more."""
+        return cls(
+            choices=tuple(
+                CounterChoice(name=one["name"], preset=one["preset"], overrides=one["params"]) for one in choices
+            )
+        )
 
     @property
     def makers(self) -> dict[str, CounterChoice]:

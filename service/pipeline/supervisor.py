@@ -13,14 +13,17 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable, Collection
 
-from service.errors import LinkError, LinkFault
+from service.errors import LinkError, LinkFault, NotNowError, StoreError
 from service.links.ble import DEFAULT_TIMEOUTS, PLATFORM, Backend, BleLink, Sighting, Timeouts, close_stale, scanning
 from service.links.contract import Link
+from service.pipeline.archive import Archive
 from service.pipeline.device import Device
 from service.pipeline.hub import Hub
+from service.pipeline.journal import Journal
 from service.pipeline.lifecycle import LINKED, PATIENCE, Cause, Patience
 from service.pipeline.lineup import Lineup
 from service.pipeline.roster import Roster, told_id
+from service.pipeline.session import Session
 from service.wearables.contract import Wearable
 
 SCANNER_RETRY_S = 2.0
@@ -50,6 +53,7 @@ class Supervisor:
         backend: Backend = PLATFORM,
         timeouts: Timeouts = DEFAULT_TIMEOUTS,
         patience: Patience = PATIENCE,
+        archive: Archive | None = None,
     ) -> None:
         self.hub = hub
         self.trouble: LinkError | None = None
@@ -61,6 +65,8 @@ class Supervisor:
         self._timeouts = timeouts
         self._patience = patience
         self._roster = Roster()
+        self._archive = archive
+        self._tasks: asyncio.TaskGroup | None = None
 
     @property
     def devices(self) -> list[Device]:
@@ -74,9 +80,10 @@ class Supervisor:
     def remember(self, device: Device) -> None:
         """Take in a device of an earlier run, its session restored: it is wanted, and lost until it is heard.
 
-        To be called before `running`; ValueError where the device is known already.
+        ValueError where the device is known already.
         """
         self._roster.add(device)
+        device.keep = self._keep
         device.wanted = True
 
     def connect(self, key: str) -> Device:
@@ -92,17 +99,55 @@ class Supervisor:
             device.unwant()
         return device
 
+    @property
+    def store_trouble(self) -> StoreError | None:
+        """Why nothing is stored at the moment; None while all is well, or where nothing is to be stored."""
+        return None if self._archive is None else self._archive.trouble
+
+    async def assign(self, key: str, person: str) -> None:
+        """Make a person the owner of a device's data; UnknownDeviceError, NotNowError where nothing is stored."""
+        await self._kept.assign(self.device(key), person)
+
+    async def forget(self, person: str) -> tuple[int, list[Device]]:
+        """Delete all data of a person for good; return how many sessions were deleted, and devices that were in use."""
+        return await self._kept.forget(person, self.devices)
+
+    @property
+    def _kept(self) -> Archive:
+        if self._archive is None:
+            raise NotNowError("nothing is stored by this service")
+        return self._archive
+
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Scan and connect while the context is open; leaving it closes every link."""
+        """Go on with stored sessions, scan and connect while the context is open; leaving it closes every link."""
         async with asyncio.TaskGroup() as tasks:
-            loop = tasks.create_task(self._run(tasks), name="supervisor")
+            self._tasks, own = tasks, []
+            if self._archive is not None:
+                for device in await self._archive.resume(self._make_wearable, self._lineup, self.hub):
+                    self._take_up(device)
+                own.append(tasks.create_task(self._archive.keep_house(), name="house"))
+            own.append(tasks.create_task(self._run(tasks), name="supervisor"))
             try:
                 yield
             finally:
-                for device in self._roster.devices:
-                    device.stop()
-                loop.cancel()
+                self._tasks = None
+                for task in own:
+                    task.cancel()
+                await asyncio.gather(*(device.close() for device in self._roster.devices), return_exceptions=True)
+
+    def _take_up(self, device: Device) -> None:
+        """Go on with a stored session; its device is left alone where it was, or where others only are wanted now."""
+        is_wanted = device.wanted and (device.asked or self._is_wanted(device.id, device.address, device.name))
+        self.remember(device)
+        device.begin_keeping()
+        if not is_wanted:
+            device.unwant()
+
+    def _keep(self, session: Session) -> asyncio.Task[None]:
+        if self._tasks is None:
+            raise RuntimeError("the supervisor does not run")
+        return self._tasks.create_task(session.keep(), name="keep")
 
     async def _run(self, tasks: asyncio.TaskGroup) -> None:
         await close_stale([device.address for device in self._roster.devices], self._backend)
@@ -135,13 +180,13 @@ class Supervisor:
         device = self._roster.at(sighting.address)
         if device is None:
             device = self._new(sighting.address, sighting.name, sighting.rssi_dbm)
-            device.wanted = self._is_wanted(sighting)
+            device.wanted = self._is_wanted(sighting.address, sighting.name)
             self._roster.add(device)
         device.heard(sighting.name, sighting.rssi_dbm, tell_every_s=SEEN_EVERY_S)
         return device
 
     def _new(self, address: str, name: str | None = None, rssi_dbm: int | None = None) -> Device:
-        return Device(
+        device = Device(
             address=address,
             name=name,
             rssi_dbm=rssi_dbm,
@@ -149,12 +194,13 @@ class Supervisor:
             lineup=self._lineup,
             publish=self.hub.publish,
             patience=self._patience,
+            journal=Journal(self._archive.store) if self._archive else None,
         )
+        device.keep = self._keep
+        return device
 
-    def _is_wanted(self, sighting: Sighting) -> bool:
-        if self._wanted is None:
-            return True
-        return not self._wanted.isdisjoint({sighting.address.casefold(), (sighting.name or "").casefold()})
+    def _is_wanted(self, *names: str | None) -> bool:
+        return self._wanted is None or not self._wanted.isdisjoint(name.casefold() for name in names if name)
 
     async def _connect(self, device: Device, sighting: Sighting, tasks: asyncio.TaskGroup) -> None:
         """Start the device's link task and wait until it is connected or has failed."""

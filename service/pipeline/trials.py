@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -88,6 +88,12 @@ class Trials:
         """Drop a trial, whatever its state."""
         self._leave(self.get(number))
         del self._kept[number]
+
+    def forget(self, devices: Iterable[str]) -> None:
+        """Drop every trial of any of these devices."""
+        gone = set(devices)
+        for number in [number for number, trial in self._kept.items() if not gone.isdisjoint(trial.counts)]:
+            self.delete(number)
 
     def _offset_ns(self) -> int:
         return self._clock_ns() - self._steady_ns()

@@ -21,10 +21,13 @@ import numpy as np
 from service.samples import GRID_HZ, TICK_EVERY, TICK_HZ, Columns, Gap, RawBlock, SampleBlock
 from service.signals import grid
 from service.signals.compiled import compiled
+from service.signals.rate import Rate, RateSpan
 
 FILL_S = 0.6
 """Longest hole that is interpolated: less than one step at the slowest pace."""
 
+_INDEX_SPAN = 1 << 32
+"""Sample indices are u32 on the wire."""
 _TICK_SPAN = 1 << 16
 """A packet carries 16 bits of the tick."""
 _TICK = GRID_HZ / TICK_HZ
@@ -47,6 +50,7 @@ class Timebase:
     def __init__(self, rate_hz: float) -> None:
         self.rate_hz = rate_hz
         self._fit = _RateFit(GRID_HZ / rate_hz)
+        self._span = RateSpan()
         self._expected: int | None = None
         self._stretch = 0
         self._start = 0.0
@@ -58,8 +62,13 @@ class Timebase:
 
     @property
     def measured_rate_hz(self) -> float:
-        """The rate fitted to the device's ticks; the nominal one until ticks disprove it."""
+        """The rate the grid goes by: fitted to the device's ticks, the nominal one until ticks disprove it."""
         return GRID_HZ / self._fit.pace
+
+    @property
+    def rate(self) -> Rate | None:
+        """The rate as the device's ticks tell it by now, and how well; None until it has told two."""
+        return self._span.rate
 
     @property
     def now_s(self) -> float:
@@ -87,7 +96,9 @@ class Timebase:
         if broken:
             self._begin(block)
         self._follow_sensors(block)
-        self._fit.observe(block, self._start, self._stretch)
+        tick = self._fit.observe(block, self._start, self._stretch)
+        if tick is not None:
+            self._span.observe(self._stretch, tick)
         first_s = (self._start + (block.index - self._stretch * TICK_EVERY) * self._pace) / GRID_HZ
         gap = None
         if hole > 0:
@@ -97,8 +108,8 @@ class Timebase:
 
     def snapshot(self) -> dict[str, Any]:
         """Return the whole state as plain data."""
-        plain = {key: value for key, value in vars(self).items() if key != "_fit"}
-        return copy.deepcopy({**plain, "_fit": vars(self._fit)})
+        parts = {"_fit": vars(self._fit), "_span": vars(self._span)}
+        return copy.deepcopy({**vars(self), **parts})
 
     @classmethod
     def restored(cls, state: dict[str, Any]) -> Timebase:
@@ -106,6 +117,7 @@ class Timebase:
         made = cls(state["rate_hz"])
         state = copy.deepcopy(state)
         vars(made._fit).update(state.pop("_fit"))
+        vars(made._span).update(state.pop("_span", {}))
         vars(made).update(state)
         return made
 
@@ -135,11 +147,18 @@ class Timebase:
                 self._lanes[name] = lane
 
     def _expected_tick(self, stretch: int, start: float) -> float:
-        """Return about which tick the stretch begins at: by the device's clock where it told it, else by the rate."""
-        if self._clock is None or self._expected is not None:
+        """Return about which tick the stretch begins at, counted from where it was last known.
+
+        That is where the grid broke off or where the device told its clock, whichever is nearer: it tells it at each
+        connection, and by the rate alone the high bits are lost in a day (half of 64 s are 370 ppm of it).
+        """
+        if self._clock is None:
             return start / _TICK
         index, tick = self._clock
-        return tick + (stretch * TICK_EVERY - index) * self._fit.pace / _TICK
+        samples = (stretch * TICK_EVERY - index + _INDEX_SPAN // 2) % _INDEX_SPAN - _INDEX_SPAN // 2
+        if self._expected is not None and abs(samples) >= stretch * TICK_EVERY - self._expected:
+            return start / _TICK
+        return tick + samples * self._fit.pace / _TICK
 
     def _place(self, block: RawBlock) -> SampleBlock:
         """Run the kernel over `block`, stretch by stretch."""
@@ -204,15 +223,20 @@ class _RateFit:
         place = _tick_place(tick)
         return start if abs(place - start) <= _TICK else place
 
-    def observe(self, block: RawBlock, start: float, stretch: int) -> None:
-        """Take the tick of the stretch `block` begins in, once; `start` is where the grid has that stretch."""
+    def observe(self, block: RawBlock, start: float, stretch: int) -> int | None:
+        """Take the tick of the stretch `block` begins in, once, and return it with its high bits.
+
+        `start` is where the grid has that stretch.
+        """
         at = block.index // TICK_EVERY
         if block.tick is None or at != stretch or (self._seen is not None and self._seen[0] >= at):
-            return
-        place = _tick_place(_full_tick(block.tick, start / _TICK))
+            return None
+        tick = _full_tick(block.tick, start / _TICK)
+        place = _tick_place(tick)
         self._seen, self._error = (at, place), place - start
         if not self._anchors or at - self._anchors[-1][0] >= _ANCHOR_STRETCHES:
             self._anchors = [*self._anchors[-1:], (at, place)]
+        return tick
 
     def next_pace(self, start: float, stretch: int) -> float:
         """Return the pace of the stretch that begins at `start`, from ticks of stretches before it."""

@@ -59,6 +59,33 @@ def by_stretch(chunk: Chunk) -> Iterator[Chunk]:
     yield codec.cut(chunk, first, chunk.end)
 
 
+def blocks(chunk: Chunk) -> Iterator[RawBlock]:
+    """Yield a chunk as blocks of the very values that were counted when the device sent them."""
+    layout = chunk.layout
+    for piece in by_stretch(chunk):
+        limits = [index for column in codec.columns(piece) if column for index in _at_limit(column)]
+        yield RawBlock(
+            boot=piece.boot,
+            index=piece.index,
+            tick=piece.ticks[0],
+            saturated=sorted(set(limits)),
+            acc_g=_values(piece.acc, layout.lsb_per_g),
+            gyro_rad_s=_values(piece.gyro, layout.lsb_per_rad_s) if piece.gyro and layout.lsb_per_rad_s else None,
+            mag_ut=_values(piece.mag, layout.lsb_per_ut) if piece.mag and layout.lsb_per_ut else None,
+        )
+
+
+def _values(data: bytes, lsb: float) -> Columns:
+    x, y, z = (np.frombuffer(data, "<i2").reshape(-1, 3).T / lsb).tolist()
+    return x, y, z
+
+
+def _at_limit(data: bytes) -> list[int]:
+    """Return which samples hold a value at its limit."""
+    values = np.frombuffer(data, "<i2").reshape(-1, 3)
+    return [int(index) for index in np.flatnonzero(((values == -32768) | (values == 32767)).any(axis=1))]
+
+
 def counts(columns: Columns, lsb: float) -> bytes:
     """Return samples as the integers that the device sent; ParameterError where one is none of 16 bits."""
     values = np.rint(np.array(columns, dtype=np.float64).T * lsb)

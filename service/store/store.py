@@ -16,6 +16,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeVar
 
+from filelock import FileLock, Timeout
+
 from service.errors import StoreError, StoreFault
 from service.store import database, keeping
 from service.store.contract import Keeper, Recorder
@@ -153,9 +155,36 @@ async def open_store(
 ) -> AsyncIterator[Store]:
     """Open the database at `path`, made or migrated where needed; StoreError says why it cannot be.
 
-    A deletion that was begun before a crash is gone on with. Leaving writes what is queued and closes.
+    One process at a time: another one's events would be numbered as ours. A deletion that was begun before a crash is
+    gone on with. Leaving writes what is queued and closes.
     """
-    await asyncio.to_thread(database.prepare, path)
+    async with _alone(path):
+        await asyncio.to_thread(database.prepare, path)
+        async with _opened(path, queue_batches, patience_s, retry_s, connect) as store:
+            yield store
+
+
+@contextlib.asynccontextmanager
+async def _alone(path: Path) -> AsyncIterator[None]:
+    """Hold a lock beside the database, which the system lets go of however the process ends."""
+    lock = FileLock(path.with_name(f"{path.name}.lock"), timeout=0)
+    with told(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            lock.acquire()
+        except Timeout:
+            why = f"{path} is in use by another steplink: end it, or name another file with --store"
+            raise StoreError(StoreFault.IN_USE, why) from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@contextlib.asynccontextmanager
+async def _opened(
+    path: Path, queue_batches: int, patience_s: float, retry_s: float, connect: Connect
+) -> AsyncIterator[Store]:
     writer = Writer(path, connect=connect, retry_s=retry_s)
     store = Store(path, writer, queue_batches=queue_batches, patience_s=patience_s)
     writer.start()

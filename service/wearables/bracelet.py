@@ -321,7 +321,8 @@ class Bracelet:
         self._sensors = sensors
         self._scales = {sensor: scale for sensor, scale in self._scales.items() if sensor not in _OPTIONAL}
         self._scales |= {sensor: scale / _UNITS[sensor] for sensor, scale in told.items()}
-        return DeviceInfo(sensors=sensors)
+        gyroscope, magnetometer = (self._scales.get(sensor) for sensor in _OPTIONAL)
+        return DeviceInfo(sensors=sensors, lsb_per_rad_s=gyroscope, lsb_per_ut=magnetometer)
 
 
 def _values(data: bytes, held: Sensors) -> tuple[int, ...]:

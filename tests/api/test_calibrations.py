@@ -60,7 +60,7 @@ async def test_a_failed_one_says_why_and_what_to_do():
         await lab.ask("POST", ALL, 201, json=WALK | {"seconds": 60})
         lab.walk(3)
         lab.walk(2, heard=False)
-        lab.walk(1)
+        lab.walk(2)
         failed = await lab.ask("GET", f"{ALL}/1")
         assert (failed["state"], failed["params"]) == ("failed", None)
         assert "repeat" in failed["reason"]

@@ -180,6 +180,8 @@ async def test_every_event_has_a_schema_and_openapi_has_examples(walk):
         "gap",
         "reboot",
         "segment",
+        "correction",
+        "awaited",
         "signal",
         "counting",
         "device",

@@ -77,6 +77,8 @@ class Stand:
             if heard and data is not None:
                 packet = Packet(characteristic=wire.DATA, data=data, at_ns=self.now_ns + self._delay_ns)
                 self.device.session.apply(packet)
+                while self.device.session.tracker.has_work:
+                    self.device.session.catch_up()
 
     def until(self, holds, *, within_s=60):
         """Walk on until `holds()`; fail after `within_s`."""

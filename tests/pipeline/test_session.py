@@ -9,7 +9,7 @@ from service.pipeline.lineup import lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Session
 from service.samples import GRID_HZ, Gridded, Rebooted, Sensor, Step, StepCounted, Update
-from service.tracking.tracker import Tracker
+from service.tracking.backfill import BackfillTracker
 from service.wearables import bracelet as wire
 
 
@@ -21,7 +21,7 @@ class LateCounter(MetronomeCounter):
 
 
 def session(told):
-    tracker = Tracker(wire.Bracelet(), {"late": LateCounter}, primary="late")
+    tracker = BackfillTracker(wire.Bracelet(), {"late": LateCounter}, primary="late")
     made = Session(lambda: "dev-1", tracker, told.append)
     for packet in described():
         made.apply(packet)
@@ -78,7 +78,7 @@ A, G, M = Sensor
 
 def described_to(counter, published, **said):
     chosen = lineup(counter)
-    made = Session(lambda: "sim-1", Tracker(wire.Bracelet(), chosen.makers, primary=counter), published.append)
+    made = Session(lambda: "sim-1", BackfillTracker(wire.Bracelet(), chosen.makers, primary=counter), published.append)
     for packet in described(**said):
         made.apply(packet)
     return made

@@ -1,0 +1,234 @@
+"""What a session has told and the disk does not hold yet: gathered, and stored as one batch a second.
+
+A batch holds samples, the events that follow from them, and the place up to which both are counted, all of the same
+moment: so whenever a crash comes, what the store holds fits together, and the rest is asked of the device again. While
+nothing can be written, counting goes on and its events wait here; of the samples the newest HELD_CHUNKS do, as many as
+a device keeps itself, and those that must go are made up for by a snapshot of the count.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from service.errors import StoreError, StoreFault
+from service.samples import DeviceInfo, Heard, Received
+from service.store.chunker import Chunker
+from service.store.values import (
+    Batch,
+    Chunk,
+    Cursor,
+    Description,
+    Layout,
+    LogEntry,
+    LogPage,
+    LogQuery,
+    SessionKey,
+    Snapshot,
+)
+
+BATCH_S = 1.0
+"""How long events and samples are gathered before they are stored: what a crash costs at most is asked for again."""
+SNAPSHOT_NS = 30_000_000_000
+"""A restart counts at most so much again."""
+HELD_CHUNKS = 600
+"""Seconds of samples that wait for a disk: ten minutes, which the device itself keeps too."""
+HELD_ENTRIES = 20_000
+"""Events that wait for a disk: three hours of walking. Policy: the oldest are not logged; the count has them."""
+RETRY_S = 1.0
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """Where a session stands: what its count awaits, and whatever a restart needs, made only when it is asked for."""
+
+    cursor: Cursor | None
+    state: Callable[[], Mapping[str, Any]]
+    about: Mapping[str, Any]
+
+
+class Archive(Protocol):
+    """What a journal needs of a store."""
+
+    async def append(self, batch: Batch) -> None:
+        """Store a batch; return when it is on the disk."""
+
+    async def read(self, query: Callable[[Any], Any]) -> Any:  # noqa: ANN401
+        """Return what `query` reads."""
+
+
+class Journal:
+    """One session's. Without a `store` it holds the newest events in memory, and no samples."""
+
+    def __init__(self, store: Archive | None = None) -> None:
+        self.key: SessionKey | None = None
+        """Set once the device's id is known; nothing is stored before."""
+        self._store = self._kept_in = store
+        self._entries: deque[LogEntry] = deque(maxlen=HELD_ENTRIES)
+        self._unsure: Batch | None = None
+        """On its way to the disk, or there without our knowing."""
+        self._closing = False
+        self._chunker = Chunker()
+        self._chunks: list[Chunk] = []
+        self._descriptions: list[Description] = []
+        self._about: Mapping[str, Any] | None = None
+        """As it was stored last."""
+        self._snapshot_ns: int | None = None
+        """When the last snapshot was taken; None wants one with the next batch."""
+        self._changed = asyncio.Event()
+        self._over = False
+
+    def begin(self, key: SessionKey, about: Mapping[str, Any] | None = None) -> None:
+        """Store under `key` from now on; `about` where the store has it already."""
+        self.key, self._about = key, about
+        self._changed.set()
+
+    def received(self, told: Received, info: DeviceInfo, at_ns: int) -> None:
+        """Take samples that are new, of a device that described itself by `info`."""
+        if self._store is None or self._over or info.rate_hz is None or info.lsb_per_g is None:
+            return
+        layout = Layout(
+            rate_hz=info.rate_hz,
+            lsb_per_g=info.lsb_per_g,
+            lsb_per_rad_s=info.lsb_per_rad_s,
+            lsb_per_ut=info.lsb_per_ut,
+        )
+        self._chunks += self._chunker.add(told.block, run=told.run, layout=layout, at_ns=at_ns)
+        if len(self._chunks) > HELD_CHUNKS:
+            del self._chunks[: len(self._chunks) - HELD_CHUNKS]
+            self._snapshot_ns = None
+        self._changed.set()
+
+    def heard(self, told: Heard, at_ns: int) -> None:
+        """Take a value by which the device described itself."""
+        if self._store is None or self._over:
+            return
+        said = Description(
+            run=told.run,
+            boot=told.boot,
+            index=told.index,
+            at_ns=at_ns,
+            characteristic=told.characteristic,
+            value=told.data,
+        )
+        self._descriptions.append(said)
+        self._changed.set()
+
+    def log(self, entry: LogEntry) -> None:
+        """Take a durable event."""
+        if self._over:
+            return
+        if len(self._entries) == HELD_ENTRIES and self._store is not None and self.key is not None:
+            logger.error("an event of %s finds no room and will not be in the log", self.key.device)
+        self._entries.append(entry)
+        self._changed.set()
+
+    def mark(self) -> None:
+        """Have a snapshot stored with the next batch: something changed that samples do not tell."""
+        self._snapshot_ns = None
+        self._changed.set()
+
+    async def page(self, query: LogQuery) -> LogPage:
+        """Return a page of the session's device's events, those included that are not on the disk yet."""
+        waiting = [
+            entry for entry in (*(self._unsure.entries if self._unsure else ()), *self._entries) if _asked(entry, query)
+        ]
+        found = LogPage(entries=(), next_after=None)
+        if self._store is not None and self.key is not None:
+            found = await self._store.read(lambda reader: reader.log(query))
+        if found.next_after is not None:
+            return found
+        there = {entry.ordinal for entry in found.entries}
+        entries = [*found.entries, *(entry for entry in waiting if entry.ordinal not in there)]
+        more = len(entries) > query.limit
+        return LogPage(entries=entries[: query.limit], next_after=entries[query.limit - 1].ordinal if more else None)
+
+    async def keep(self, standing: Callable[[], Standing], clock: Callable[[], int]) -> None:
+        """Store a batch a second while there is something to store; `clock` is host UTC in ns. Never ends by itself."""
+        while True:
+            await self._changed.wait()
+            await asyncio.sleep(BATCH_S)
+            await self.store(standing(), clock())
+
+    async def close(self, standing: Standing, now_ns: int, *, ended: bool = False) -> None:
+        """Store what there is, with a snapshot; what the disk does not take now is lost. `ended` ends the session."""
+        self._closing = True
+        self.mark()
+        await self.store(standing, now_ns)
+        if ended and self._store is not None and self.key is not None:
+            self._unsure = Batch(session=self.key, ended_ns=now_ns)
+            await self._send()
+
+    def successor(self) -> Journal:
+        """Return an empty journal of the same store, for the next session."""
+        return Journal(self._kept_in)
+
+    def drop(self) -> None:
+        """Forget all that waits and store nothing more: the session's data are deleted."""
+        self._over, self._store = True, None
+        self._entries.clear()
+        self._chunks, self._descriptions, self._unsure = [], [], None
+
+    async def store(self, standing: Standing, now_ns: int) -> None:
+        """Store what there is now; while the disk does not take it, wait and try again."""
+        await self._send()
+        self._changed.clear()
+        if self._store is not None and self.key is not None:
+            self._unsure = self._take(self.key, standing, now_ns)
+            await self._send()
+
+    async def _send(self) -> None:
+        """Have the store take the batch at hand. Cancelled in the middle, it is sent again: twice changes nothing."""
+        while (batch := self._unsure) is not None and self._store is not None:
+            try:
+                await self._store.append(batch)
+            except StoreError as error:
+                if error.is_passing and not self._closing:
+                    await asyncio.sleep(RETRY_S)
+                    continue
+                if error.reason is not StoreFault.GONE:
+                    logger.error("events and samples of %s are not stored: %s", batch.session.device, error)  # noqa: TRY400
+            if self._unsure is batch:
+                self._unsure = None
+
+    def _take(self, key: SessionKey, standing: Standing, now_ns: int) -> Batch:
+        """Return all that waits as one batch, of this very moment."""
+        cursor = standing.cursor
+        snapshot = None
+        due = self._snapshot_ns is None or not 0 <= now_ns - self._snapshot_ns < SNAPSHOT_NS
+        if cursor is not None and due:
+            snapshot = Snapshot(cursor=cursor, at_ns=now_ns, state=standing.state())
+            self._snapshot_ns = now_ns
+        about = None if standing.about == self._about else standing.about
+        self._about = standing.about
+        batch = Batch(
+            session=key,
+            chunks=[*self._chunks, *self._chunker.flush()],
+            descriptions=self._descriptions,
+            entries=tuple(self._entries),
+            cursor=cursor,
+            snapshot=snapshot,
+            about=about,
+        )
+        self._entries.clear()
+        self._chunks, self._descriptions = [], []
+        return batch
+
+
+def _asked(entry: LogEntry, query: LogQuery) -> bool:
+    """Whether an event is one that a store would find by this query."""
+    told = entry.told
+    kind, counter = getattr(told, "kind", "step"), getattr(told, "counter", None)
+    return (
+        entry.ordinal > query.after
+        and (query.from_ns is None or entry.at_ns >= query.from_ns)
+        and (query.to_ns is None or entry.at_ns < query.to_ns)
+        and (query.kinds is None or kind in query.kinds)
+        and (query.counter is None or counter == query.counter)
+    )
