@@ -3,8 +3,10 @@
 | module | holds |
 | --- | --- |
 | `gait`, `source` | what is measured: a synthetic walker, or a recording |
-| `bracelet` | sensor, tick clock, sample numbers, packets; pure |
-| `gatt`, `peripheral` | the bracelet on the air: pacing and faults; GATT table, advertising, link |
+| `bracelet`, `ring`, `rated` | sensor, clocks, sample numbers, packets, the last ten minutes, another rate; pure |
+| `control_point` | what a host asks for and is answered; pure |
+| `battery`, `step_register`, `pace` | what else it tells: charge, its own steps, running speed and cadence; pure |
+| `gatt`, `peripheral`, `gatt_table` | the bracelet on the air: pacing and faults; advertising, link; GATT table |
 | `controller`, `air`, `air_tcp` | the virtual radio: in this process, or over loopback TCP |
 | `central`, `bleak_backend` | the host's side, as classes that bleak takes as `backend=` |
 

@@ -34,9 +34,10 @@ class Participants:
         speed: float = 1.0,
         start: Start = Start.POWER_ON,
         max_mtu: int = 517,
+        encrypted: bool = False,
     ) -> GattBracelet:
         """Return a bracelet that is on this air while entered; parameters as for GattBracelet."""
-        return GattBracelet(bracelet, self, name=name, speed=speed, start=start, max_mtu=max_mtu)
+        return GattBracelet(bracelet, self, name=name, speed=speed, start=start, max_mtu=max_mtu, encrypted=encrypted)
 
     def central(self, name: str = "central") -> AbstractAsyncContextManager[BleakBackends]:
         """Return bleak's `scanner` and `client` classes for a host on this air, usable while entered."""

@@ -14,15 +14,17 @@ from typing import Any, Final
 from bumble import att, data_types, hci
 from bumble.core import UUID, AdvertisingData, BaseBumbleError
 from bumble.device import Connection, Device, DeviceConfiguration
-from bumble.gatt import Characteristic, CharacteristicValue, Service
+from bumble.gatt import Characteristic
 from bumble.transport.common import Transport
 
 from device_sim.bracelet import Bracelet
+from device_sim.control_point import ControlPoint, RefusedError
 from device_sim.controller import AirHost
+from device_sim.gatt_table import Table
 from device_sim.operations import Operations
 from service.errors import LinkError, LinkFault, ParameterError
-from service.samples import ACCELEROMETER_ONLY
 from service.wearables import bracelet as wire
+from service.wearables.bracelet_control import Answer, encode_answer
 
 HCI_TIMEOUT_S: Final = 5.0
 """A controller answers in milliseconds; one that does not is gone."""
@@ -38,8 +40,6 @@ ADVERTISING_INTERVAL_MS: Final = 31.25
 NAME_BYTES: Final = 8
 """What 31 bytes hold beside flags and a 128-bit UUID; the link carries no scan response."""
 DEFAULT_MTU: Final = 23
-
-_P = Characteristic.Properties
 
 
 def static_address(device_id: str) -> hci.Address:
@@ -68,12 +68,19 @@ def advertisement(name: str) -> bytes:
 class Peripheral:
     """A bumble device that serves one bracelet's table.
 
-    `on_subscribed` is called when a host asks for data. While `muted` is set it sends nothing and answers nothing;
-    while `away` is set it does not advertise.
+    `on_asked` is called when a host asks for data, live or from history. While `muted` is set it sends nothing and
+    answers nothing; while `away` is set it does not advertise.
     """
 
     def __init__(
-        self, transport: Transport, bracelet: Bracelet, *, name: str, max_mtu: int, on_subscribed: Callable[[], None]
+        self,
+        transport: Transport,
+        bracelet: Bracelet,
+        *,
+        name: str,
+        max_mtu: int,
+        encrypted: bool,
+        on_asked: Callable[[], None],
     ) -> None:
         config = DeviceConfiguration(
             name=name,
@@ -88,12 +95,16 @@ class Peripheral:
         self.muted = False
         self.away = False
         self.links_made = 0
-        self._data = _characteristic(wire.DATA, _P.NOTIFY, None)
-        self._battery = _characteristic(wire.BATTERY_LEVEL, _P.READ | _P.NOTIFY, bracelet.battery_value)
-        self.device.add_services(_services(bracelet, self._data, self._battery))
+        self.control = ControlPoint(bracelet)
+        self._table = Table(bracelet, self._on_request, encrypted=encrypted)
+        self.device.add_services(self._table.services)
         self._operations = Operations(name)
-        self._on_subscribed = on_subscribed
-        self._subscribed = False
+        self._answers = Operations(f"{name} answers")
+        self._on_asked = on_asked
+        self._has_control = bracelet.control
+        self._encrypted = encrypted
+        self._subscribed = self._indicated = False
+        """Whether the host has enabled the notifications of data, and the indications of the control point."""
         self._link: Connection | None = None
         self._asked = False
         """Whether the host of the present link has asked for anything."""
@@ -103,7 +114,8 @@ class Peripheral:
         self._lost = transport.source.terminated
         self._changed = asyncio.Event()
         self._lock = asyncio.Lock()
-        self._data.on(Characteristic.EVENT_SUBSCRIPTION, self._on_subscription)
+        self._table.data.on(Characteristic.EVENT_SUBSCRIPTION, self._on_data_subscription)
+        self._table.control.on(Characteristic.EVENT_SUBSCRIPTION, self._on_control_subscription)
         self.device.on(Device.EVENT_CONNECTION, self._on_connection)
         self.device.l2cap_channel_manager.register_fixed_channel(att.ATT_CID, self._on_att)
 
@@ -119,8 +131,12 @@ class Peripheral:
 
     @property
     def listening(self) -> bool:
-        """Whether a notification of data would reach a host."""
-        return self._subscribed and not self.muted
+        """Whether a host takes samples as they come."""
+        if self._link is None or not self._subscribed or self.muted:
+            return False
+        if self._encrypted and not self._link.is_encrypted:
+            return False
+        return self.control.streaming or not self._has_control
 
     async def start(self) -> None:
         """Power on and advertise; LinkError where the controller does not answer."""
@@ -147,11 +163,22 @@ class Peripheral:
                 await self._hci(self.device.start_advertising() if wanted else self.device.stop_advertising())
 
     async def notify(self, value: bytes) -> bool:
-        """Send one value of the data characteristic; wait while the radio is full. False where nobody took it."""
+        """Send one live packet; wait while the radio is full. False where nobody took it."""
+        return self.listening and await self._send(value)
+
+    async def report(self) -> bool:
+        """Send the next packet of a report, or its answer; False where no packet was sent."""
+        part = self.control.next_part(self.mtu)
+        if isinstance(part, Answer):
+            self._answer(part)
+        return isinstance(part, bytes) and await self._send(part)
+
+    async def _send(self, value: bytes) -> bool:
+        """Notify one value of the data characteristic; wait while the radio is full."""
         link = self._link
-        if link is None or not self.listening:
+        if link is None:
             return False
-        await self.device.gatt_server.notify_subscriber(link, self._data, value)
+        await self.device.gatt_server.notify_subscriber(link, self._table.data, value)
         queue = self.device.host.le_acl_packet_queue
         if queue is not None and queue.pending > UNSENT_PACKETS:
             try:
@@ -167,7 +194,17 @@ class Peripheral:
     async def notify_battery(self) -> None:
         """Send the battery's charge to whoever subscribed to it."""
         if self._link is not None and not self.muted:
-            await self.device.gatt_server.notify_subscriber(self._link, self._battery)
+            await self.device.gatt_server.notify_subscriber(self._link, self._table.battery)
+
+    async def notify_register(self) -> None:
+        """Send the step register to whoever subscribed to it."""
+        if self._link is not None and not self.muted:
+            await self.device.gatt_server.notify_subscriber(self._link, self._table.register)
+
+    async def notify_pace(self, value: bytes) -> None:
+        """Send running speed and cadence to whoever subscribed to it."""
+        if self._link is not None and not self.muted:
+            await self.device.gatt_server.notify_subscriber(self._link, self._table.pace, value)
 
     async def drop(self, reason: int = hci.HCI_ErrorCode.CONNECTION_TIMEOUT_ERROR) -> None:
         """End the link, by default as if it had been out of range; return when it has ended."""
@@ -189,6 +226,7 @@ class Peripheral:
 
     async def close(self) -> None:
         """End what waits for an answer, after the transport is gone."""
+        await self._answers.close()
         await self._operations.close()
 
     async def _hci(self, command: Coroutine[Any, Any, object]) -> None:
@@ -215,7 +253,9 @@ class Peripheral:
         if self._link is not link:  # one that has been given up, or whose end is told after the next one's beginning
             return
         self._link = None
-        self._subscribed = False
+        self._subscribed = self._indicated = False
+        self.control.disconnected()
+        self._answers.abandon()
         self._changed.set()
 
     def _suspect(self, link: Connection) -> None:
@@ -233,61 +273,50 @@ class Peripheral:
         )
         await self._hci(self.device.send_async_command(command, check_status=False))
 
-    def _on_subscription(self, bearer: object, notify: bool, _indicate: bool) -> None:
+    # bumble handles a write in a task of its own, which may outlive the link.
+
+    def _on_data_subscription(self, bearer: object, notify: bool, _indicate: bool) -> None:
         if bearer is not self._link:
-            return  # bumble handles a write in a task of its own, which may outlive the link
+            return
         self._subscribed = notify
-        if notify:
-            self._on_subscribed()
+        if not notify and (answer := self.control.fail_report()) is not None:
+            self._answer(answer)
+        self._tell_asked()
+
+    def _on_control_subscription(self, bearer: object, _notify: bool, indicate: bool) -> None:
+        if bearer is self._link:
+            self._indicated = indicate
+
+    def _on_request(self, bearer: object, data: bytes) -> None:
+        """Take a write of the control point; its answer follows the write's own response."""
+        if bearer is not self._link:
+            return
+        try:
+            answer = self.control.take(data, indications=self._indicated, notifications=self._subscribed)
+        except RefusedError as error:
+            raise att.ATT_Error(att.ErrorCode(error.fault)) from None
+        if answer is not None:
+            self._answer(answer)
+        self._tell_asked()
+
+    def _tell_asked(self) -> None:
+        if self.listening or self.control.reporting:
+            self._on_asked()
+
+    def _answer(self, answer: Answer) -> None:
+        if self._link is not None:
+            self._answers.spawn(self._indicate(self._link, encode_answer(answer)))
+
+    async def _indicate(self, link: Connection, value: bytes) -> None:
+        """Indicate an answer and wait for its confirmation; a host that gives none has lost the link."""
+        try:
+            await self.device.gatt_server.indicate_subscriber(link, self._table.control, value)
+        except TimeoutError:
+            await self.drop()
+        if self._link is link:
+            self.control.confirmed()
 
     def _on_att(self, handle: int, pdu: bytes) -> None:
         self._asked = True
         if not self.muted:
             self.device.on_gatt_pdu(handle, pdu)
-
-
-def _services(bracelet: Bracelet, data: Characteristic[bytes], battery: Characteristic[bytes]) -> list[Service]:
-    def text(uuid: str, value: str) -> Characteristic[bytes]:
-        return _characteristic(uuid, _P.READ, value.encode)
-
-    # As old firmware has it: who measures acceleration only need not say so.
-    more = bracelet.sensors != ACCELEROMETER_ONLY
-    sensors = [_characteristic(wire.SENSORS, _P.READ, bracelet.sensors_value)] if more else []
-    return [
-        Service(
-            wire.SERVICE,
-            [
-                data,
-                *sensors,
-                _characteristic(wire.SCALE, _P.READ, bracelet.scale_value),
-                _characteristic(wire.RATE, _P.READ, bracelet.rate_value),
-                _characteristic(wire.BOOT, _P.READ, bracelet.boot_value),
-                _characteristic(wire.DEVICE_ID, _P.READ, bracelet.device_id_value),
-                _characteristic(wire.CLOCK, _P.READ, bracelet.clock_value),
-            ],
-        ),
-        Service("180F", [battery]),
-        Service(
-            "180A",
-            [
-                text(wire.MANUFACTURER_NAME, bracelet.manufacturer),
-                text(wire.MODEL_NUMBER, bracelet.model),
-                text(wire.FIRMWARE_REVISION, bracelet.firmware),
-            ],
-        ),
-    ]
-
-
-def _characteristic(uuid: str, properties: _P, value: Callable[[], bytes] | None) -> Characteristic[bytes]:
-    """Return a characteristic that refuses what it does not offer; bumble would leave a refused write unanswered."""
-
-    def read(_connection: object) -> bytes:
-        if value is None:
-            raise att.ATT_Error(att.ErrorCode.READ_NOT_PERMITTED)
-        return value()
-
-    def write(_connection: object, _value: bytes) -> None:
-        raise att.ATT_Error(att.ErrorCode.WRITE_NOT_PERMITTED)
-
-    short = uuid[4:8] if uuid.endswith("-0000-1000-8000-00805f9b34fb") else uuid
-    return Characteristic(short, properties, Characteristic.READABLE, CharacteristicValue(read=read, write=write))

@@ -192,7 +192,9 @@ def _on_air(air: Any, bracelet: Bracelet, name: str, options: argparse.Namespace
     from device_sim.gatt import Start  # noqa: PLC0415
 
     start = Start.ON_SUBSCRIBE if options.recording or options.once else Start.POWER_ON
-    device: GattBracelet = air.bracelet(bracelet, name=name, speed=options.speed, start=start)
+    device: GattBracelet = air.bracelet(
+        bracelet, name=name, speed=options.speed, start=start, encrypted=options.encrypted
+    )
     return device
 
 
@@ -213,12 +215,18 @@ def _bracelet(options: argparse.Namespace, device: str, *, mirrored: bool = Fals
 
     from device_sim.bracelet import Bracelet  # noqa: PLC0415
 
+    offset_s = options.utc_offset_s
     # Boots count upwards for ever; a simulated bracelet keeps no flash memory, so the clock counts for it.
     return Bracelet(
         _source(options, mirrored=mirrored),
         device_id=device,
         boot=time.time_ns() // BOOT_NS & 0xFFFFFFFF,
         packet_samples=options.packet_samples,
+        history_s=options.history_s,
+        drift_ppm=options.drift_ppm,
+        sensor_ppm=options.sensor_ppm,
+        battery_hours=options.battery_hours,
+        utc_ms=None if offset_s is None else time.time_ns() // 1_000_000 + round(offset_s * 1000),
     )
 
 

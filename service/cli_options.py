@@ -128,6 +128,47 @@ def add_bracelet(parser: argparse.ArgumentParser) -> None:
         help="most samples of one packet; 0 fills the MTU, 8 at 50 Hz are 0.16 s (default 8)",
     )
 
+    _add_hardware(parser)
+
+
+def _add_hardware(parser: argparse.ArgumentParser) -> None:
+    """Add what a simulated bracelet's clocks, memory and battery are like."""
+    parser.add_argument(
+        "--history-s",
+        type=number(0, 600),
+        default=600.0,
+        help="seconds of samples it keeps and sends again when asked, 0–600 s, 0 none (default 600)",
+    )
+    parser.add_argument(
+        "--drift-ppm",
+        type=number(-10_000, 10_000),
+        default=0.0,
+        help="how fast its clock runs against true time, -10000–10000 ppm (default 0)",
+    )
+    parser.add_argument(
+        "--sensor-ppm",
+        type=number(-10_000, 10_000),
+        default=0.0,
+        help="how fast its sensor samples against that clock, -10000–10000 ppm: the rate's error (default 0)",
+    )
+    parser.add_argument(
+        "--utc-offset-s",
+        type=number(-86_400, 86_400),
+        metavar="S",
+        help="how far its own UTC is ahead, -86400–86400 s (default: it does not know the time until it is told)",
+    )
+    parser.add_argument(
+        "--battery-hours",
+        type=number(0.001, 100_000),
+        metavar="H",
+        help="how long its battery lasts from full to empty, 0.001–100000 h; then it is off (default for ever)",
+    )
+    parser.add_argument(
+        "--encrypted",
+        action="store_true",
+        help="say and take nothing before it is paired with; the service does that by itself",
+    )
+
 
 def add_wrists(parser: argparse.ArgumentParser) -> None:
     """Add on how many wrists a walker wears a bracelet."""

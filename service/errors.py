@@ -81,6 +81,7 @@ class LinkFault(StrEnum):
     LOST = "lost"
     SILENT = "silent"
     NOT_OURS = "not_ours"
+    TWIN = "twin"
     REFUSED = "refused"
 
 

@@ -172,15 +172,18 @@ class DeviceInfo:
     sensors: Sensors | None = None
     history_samples: int | None = None
     """How many of its newest samples it can send again; 0 or None: none."""
+    register_steps: int | None = None
+    """What its own simple counter has counted since boot: to be shown beside our count, never summed into it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
     """A device's answer to a request.
 
-    `request` names it ("start", "stop", "rate", "range", "time", "history"); `why` is a sentence where it was not
-    `accepted`. Of history, the device has sent again all that it held of the range asked for: `samples` of them from
-    `first` (u32) of boot `boot` on. What was asked for and lies outside of that it does not have any more.
+    `request` names it ("start", "stop", "rate", "range", "time", "history", "extent", "abort"); `why` is a sentence
+    where it was not `accepted`. Of history, the device has sent again all that it held of the range asked for:
+    `samples` of them from `first` (u32) of boot `boot` on. What was asked for and lies outside of that it does not
+    have any more.
     """
 
     request: str
@@ -255,7 +258,12 @@ class Gap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Awaited:
-    """Not numbered: samples that did not arrive and may still come; until then what is behind them is tentative."""
+    """Not numbered: samples that did not arrive and may still come; until then what is behind them is tentative.
+
+    Told once more packets have come behind them than a reordering lasts. Each is over with the first Corrected of its
+    boot for which `Corrected.from_s <= from_s < Corrected.to_s`, whether its samples came or a Gap tells of those that
+    did not.
+    """
 
     from_s: float
     to_s: float
@@ -265,9 +273,10 @@ class Awaited:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Corrected:
-    """Durable: samples came late, and from `from_s` to `to_s` was counted again.
+    """Durable: what was awaited came or is lost, and from `from_s` to `to_s` was counted again.
 
-    Of the primary's steps told behind them `removed` are none, and `added` were not told.
+    Of the primary's steps that were sure behind it `removed` are none, and `added` were not told. Told for everything
+    that was Awaited, also where no step changed; for a hole that closed before only if a sure step was removed.
     """
 
     boot: int

@@ -28,6 +28,7 @@ class Stage:
     http: httpx.AsyncClient
     supervisor: Supervisor
     bracelet: GattBracelet
+    bracelets: list[GattBracelet]
 
     @property
     def live_url(self):
@@ -64,7 +65,7 @@ async def staged(bracelet, *others, durable_limit=1000, wanted=None, counter=DEF
     """Run the service over bracelets on a local air; everything is closed and joined at the end."""
     async with contextlib.AsyncExitStack() as stack:
         air = await stack.enter_async_context(LocalAir())
-        gatt, *_ = [await stack.enter_async_context(air.bracelet(worn, **radio)) for worn in (bracelet, *others)]
+        gatts = [await stack.enter_async_context(air.bracelet(worn, **radio)) for worn in (bracelet, *others)]
         central = await stack.enter_async_context(air.central())
         supervisor = Supervisor(
             hub=Hub(durable_limit=durable_limit),
@@ -80,7 +81,7 @@ async def staged(bracelet, *others, durable_limit=1000, wanted=None, counter=DEF
             async with asyncio.timeout(10):
                 await ready.wait()
             async with httpx.AsyncClient(base_url=url, trust_env=False) as http:
-                yield Stage(url, http, supervisor, gatt)
+                yield Stage(url, http, supervisor, gatts[0], gatts)
         finally:
             server.cancel()
             await asyncio.gather(server, return_exceptions=True)

@@ -3,15 +3,18 @@
 The platform's own backend is used unless another is given (the virtual radio passes one over bumble). Remedies for
 what is known to go wrong stand where they act: notifications are taken by a synchronous callback and stamped at once
 (an asynchronous one reorders them); a client is disconnected after an unsolicited drop too, or BlueZ would deliver
-every notification once more after each reconnect (bleak #2002); every connection is made from a fresh scan result.
+every notification once more after each reconnect (bleak #2002); what BlueZ remembers of a device's services is
+forgotten where a characteristic is missing. Every wait for the outside world has a bound (`Timeouts`).
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
+import sys
 import time
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
@@ -21,19 +24,22 @@ from bleak.backends.characteristic import BleakGATTCharacteristic
 from bleak.backends.client import BaseBleakClient
 from bleak.backends.device import BLEDevice
 from bleak.backends.scanner import AdvertisementData, BaseBleakScanner
-from bleak.exc import BleakBluetoothNotAvailableError, BleakError
-from bleak_retry_connector import BleakClientWithServiceCache, establish_connection
+from bleak.exc import BleakBluetoothNotAvailableError, BleakError, BleakGATTProtocolError
+from bleak_retry_connector import (
+    BleakClientWithServiceCache,
+    clear_cache,
+    close_stale_connections_by_address,
+    establish_connection,
+)
 
 from service.errors import LinkError, LinkFault
 from service.samples import Packet
 from service.wearables.contract import Action, Read, Subscribe, Write
 
-CONNECT_TIMEOUT_S = 20.0
-"""Bound on making a connection, discovery included; BlueZ itself may take 10 s to find services."""
-REQUEST_TIMEOUT_S = 5.0
-"""Bound on one read, write or subscription."""
-SILENCE_S = 5.0
-"""A link that is up but brings nothing for so long is dropped: no wearable we know pauses longer."""
+STALE_TIMEOUT_S = 10.0
+"""Bound on closing what an earlier run left connected, of all devices together."""
+_WANTS_PAIRING = frozenset({0x05, 0x0F})
+"""ATT errors insufficient authentication and insufficient encryption: one pairs, and asks again."""
 QUEUE_PACKETS = 4096
 """Packets that may wait: 13 min at five a second. Policy: the newest is dropped, which shows as a gap."""
 
@@ -41,6 +47,24 @@ _ADVICE = (
     ". No usable Bluetooth: is an adapter plugged in and switched on, and does bluetoothd run (Linux)?"
     " `steplink demo` needs none."
 )
+
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timeouts:
+    """Bounds on what is waited for."""
+
+    connect_s: float = 20.0
+    """Making a connection, discovery included; BlueZ itself may take 10 s to find services."""
+    request_s: float = 5.0
+    """One read, write or subscription; closing a connection; stopping a scan."""
+    silence_s: float = 5.0
+    """A link that is up but brings nothing for so long is dropped: no wearable we know pauses longer."""
+
+
+DEFAULT_TIMEOUTS = Timeouts()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +75,10 @@ class Backend:
     client: type[BaseBleakClient] | None = None
     advice: str = ""
     """Said to whoever has no adapter."""
+    clear_cache: Callable[[str], Awaitable[object]] | None = None
+    """Forgets what the platform remembers of an address's services."""
+    close_stale: Callable[[str], Awaitable[object]] | None = None
+    """Ends a connection to an address that an earlier run of the service left open."""
 
     @property
     def options(self) -> dict[str, Any]:
@@ -63,7 +91,11 @@ class Backend:
         return {"backend": self.client} if self.client else {}
 
 
-PLATFORM = Backend(advice=_ADVICE)
+PLATFORM = (
+    Backend(advice=_ADVICE, clear_cache=clear_cache, close_stale=close_stale_connections_by_address)
+    if sys.platform == "linux"
+    else Backend(advice=_ADVICE)
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +110,9 @@ class Sighting:
 
 
 @contextlib.asynccontextmanager
-async def scanning(services: Sequence[str], backend: Backend = PLATFORM) -> AsyncIterator[AsyncIterator[Sighting]]:
+async def scanning(
+    services: Sequence[str], backend: Backend = PLATFORM, timeouts: Timeouts = DEFAULT_TIMEOUTS
+) -> AsyncIterator[AsyncIterator[Sighting]]:
     """Scan for devices that advertise one of `services`; LinkError(NO_ADAPTER) where there is no Bluetooth."""
     heard: asyncio.Queue[Sighting] = asyncio.Queue(maxsize=256)
 
@@ -99,13 +133,13 @@ async def scanning(services: Sequence[str], backend: Backend = PLATFORM) -> Asyn
 
     scanner = BleakScanner(hear, service_uuids=list(services), **backend.options)
     with _translated("scan", LinkFault.NO_ADAPTER, backend.advice):
-        async with asyncio.timeout(CONNECT_TIMEOUT_S):
+        async with asyncio.timeout(timeouts.connect_s):
             await scanner.start()
     try:
         yield sightings()
     finally:
         with contextlib.suppress(BleakError, OSError, EOFError, TimeoutError):
-            async with asyncio.timeout(REQUEST_TIMEOUT_S):
+            async with asyncio.timeout(timeouts.request_s):
                 await scanner.stop()
 
 
@@ -120,13 +154,35 @@ async def find(services: Sequence[str], *, for_s: float, backend: Backend = PLAT
     return sorted(found.values(), key=lambda sighting: -sighting.rssi_dbm)
 
 
+async def close_stale(
+    addresses: Iterable[str], backend: Backend = PLATFORM, timeout_s: float = STALE_TIMEOUT_S
+) -> None:
+    """End connections that an earlier run left open; such a device would not advertise. Never raises, and bounded."""
+    if backend.close_stale is None:
+        return
+    try:
+        async with asyncio.timeout(timeout_s):
+            for address in addresses:
+                await backend.close_stale(address)
+    except Exception:  # whatever the platform raises: the devices that are free can be connected all the same
+        logger.warning("could not look for connections that an earlier run left open", exc_info=True)
+
+
 class BleLink:
     """One Bluetooth LE connection: connect, handshake, packets; see the contract."""
 
-    def __init__(self, handle: BLEDevice, handshake: Sequence[Action], backend: Backend = PLATFORM) -> None:
+    def __init__(
+        self,
+        handle: BLEDevice,
+        handshake: Sequence[Action],
+        backend: Backend = PLATFORM,
+        timeouts: Timeouts = DEFAULT_TIMEOUTS,
+    ) -> None:
+        self.said: list[Packet] = []
         self._handle = handle
         self._handshake = handshake
         self._backend = backend
+        self._timeouts = timeouts
         self._client: BleakClient | None = None
         self._packets: asyncio.Queue[Packet] = asyncio.Queue(QUEUE_PACKETS)
         self._arrived = asyncio.Event()
@@ -175,7 +231,7 @@ class BleLink:
             await self._do(self._connected(), write)
 
     async def _open(self) -> None:
-        async with asyncio.timeout(CONNECT_TIMEOUT_S):
+        async with asyncio.timeout(self._timeouts.connect_s):
             self._client = await establish_connection(
                 BleakClientWithServiceCache if self._backend.client is None else BleakClient,
                 self._handle,
@@ -193,7 +249,7 @@ class BleLink:
             return
         # After an unsolicited drop too: see the module's docstring.
         with contextlib.suppress(BleakError, OSError, EOFError, TimeoutError):
-            async with asyncio.timeout(REQUEST_TIMEOUT_S):
+            async with asyncio.timeout(self._timeouts.request_s):
                 await client.disconnect()
 
     async def _do(self, client: BleakClient, action: Action) -> None:
@@ -201,32 +257,54 @@ class BleLink:
         if characteristic is None:
             if getattr(action, "optional", False):
                 return
+            await self._forget_services()
             raise LinkError(LinkFault.NOT_OURS, f"{self._handle.address} has no characteristic {action.characteristic}")
-        async with asyncio.timeout(REQUEST_TIMEOUT_S):
-            match action:
-                case Read():
-                    self._put(action.characteristic, await client.read_gatt_char(characteristic))
-                case Subscribe():
-                    await client.start_notify(characteristic, self._notified)
-                case Write():
-                    await client.write_gatt_char(characteristic, action.data, response=True)
+        async with asyncio.timeout(self._timeouts.request_s):
+            try:
+                await self._carry_out(client, characteristic, action)
+            except BleakGATTProtocolError as error:
+                if error.code not in _WANTS_PAIRING:
+                    raise
+                await client.pair()
+                await self._carry_out(client, characteristic, action)
+
+    async def _carry_out(self, client: BleakClient, characteristic: BleakGATTCharacteristic, action: Action) -> None:
+        match action:
+            case Read():
+                self.said.append(self._put(action.characteristic, await client.read_gatt_char(characteristic)))
+            case Subscribe():
+                await client.start_notify(characteristic, self._notified)
+            case Write():
+                await client.write_gatt_char(characteristic, action.data, response=True)
+
+    async def _forget_services(self) -> None:
+        """Have the next connection discover anew: what is missing may be missing in a cache only."""
+        if self._backend.clear_cache is None:
+            return
+        try:
+            async with asyncio.timeout(self._timeouts.request_s):
+                await self._backend.clear_cache(self._handle.address)
+        except Exception:  # whatever the platform raises: the missing characteristic is what is told
+            logger.warning("could not forget the services of %s", self._handle.address, exc_info=True)
 
     def _notified(self, characteristic: BleakGATTCharacteristic, data: bytearray) -> None:
-        self._put(characteristic.uuid, data)
+        if self._client is not None:  # a platform may go on calling back after the end
+            self._put(characteristic.uuid, data)
 
-    def _put(self, characteristic: str, data: bytearray) -> None:
+    def _put(self, characteristic: str, data: bytearray) -> Packet:
         packet = Packet(characteristic=characteristic, data=bytes(data), at_ns=time.time_ns())
         try:
             self._packets.put_nowait(packet)
             self._arrived.set()
         except asyncio.QueueFull:
             self._dropped += 1
+        return packet
 
     async def _next(self) -> Packet:
         """Return the next packet; what arrived before a loss comes first."""
         if self._packets.empty() and not self._lost:
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(SILENCE_S):
+                async with asyncio.timeout(self._timeouts.silence_s):
                     await self._arrived.wait()
         if not self._packets.empty():
             packet = self._packets.get_nowait()
@@ -235,7 +313,7 @@ class BleLink:
             return packet
         if self._lost:
             raise LinkError(LinkFault.LOST, "the link was lost: out of range, or the device is off")
-        raise LinkError(LinkFault.SILENT, f"connected, but nothing came for {SILENCE_S:.0f} s")
+        raise LinkError(LinkFault.SILENT, f"connected, but nothing came for {self._timeouts.silence_s:g} s")
 
     def _on_lost(self, _client: BleakClient) -> None:
         self._lost = True

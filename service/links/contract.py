@@ -10,7 +10,7 @@ closes the connection. The object is then done: a new connection is a new link.
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -20,6 +20,10 @@ from service.wearables.contract import Write
 
 class Link(Protocol):
     """One connection to one device."""
+
+    @property
+    def said(self) -> Sequence[Packet]:
+        """What the device said of itself in the handshake, to know it by; iteration yields it too, and first."""
 
     async def __aenter__(self) -> Self:
         """Connect and do the handshake; LinkError says why it failed."""

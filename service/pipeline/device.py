@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import logging
+import random
 import time
 from collections.abc import Callable
 
 from service.counters import registry
-from service.errors import CounterError, LinkError, NotNowError
-from service.links.ble import Sighting
+from service.errors import CounterError, LinkError, LinkFault, NotNowError
 from service.links.contract import Link
 from service.pipeline.calibration import Calibration, Plan
 from service.pipeline.calibrations import Calibrations
-from service.pipeline.lifecycle import HEALTHY_S, LINKED, WAITING, Cause, State, advance, backoff_s
+from service.pipeline.lifecycle import LINKED, PATIENCE, WAITING, Cause, Patience, Standing, State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Publish, Session
@@ -21,29 +20,50 @@ from service.tracking.fitness import why_not
 from service.tracking.tracker import Tracker
 from service.wearables.contract import Wearable
 
-logger = logging.getLogger(__name__)
+TWIN_WAIT_S = 300.0
+"""Wait before a device is tried again that calls itself by the name of one which is connected."""
+TWIN_GRACE_S = 5.0
+"""Once that one has been lost for so long, its twin is tried at once: it may be the same, under a new address."""
+FORGET_S = 1800.0
+"""An address that never told an id is kept for so long after it was last heard; private ones change every 15 min."""
+UNHEARD = "not heard since the service started"
 
 
 class Device:
-    """One device, from the first time it is heard."""
+    """One device, from the first time it is heard; or, without `rssi_dbm`, known from before and not heard yet."""
 
-    def __init__(self, sighting: Sighting, wearable: Wearable, lineup: Lineup, publish: Publish) -> None:
-        self.address = sighting.address
-        self.name = sighting.name
-        self.rssi_dbm: int | None = sighting.rssi_dbm
+    def __init__(
+        self,
+        *,
+        address: str,
+        name: str | None = None,
+        rssi_dbm: int | None = None,
+        wearable: Wearable,
+        lineup: Lineup,
+        publish: Publish,
+        patience: Patience = PATIENCE,
+    ) -> None:
+        self.address = address
+        self.name = name
+        self.rssi_dbm = rssi_dbm
         self.wearable = wearable
         self.lineup = lineup
         tracker = Tracker(wearable, lineup.makers, primary=lineup.primary)
         self.session = Session(lambda: self.id, tracker, publish)
         self.calibrations = Calibrations(self.session)
-        self.state = State.SEEN
-        self.reason: str | None = None
+        self.reason: str | None = UNHEARD if rssi_dbm is None else None
         self.since_ns = time.time_ns()
         self.wanted = False
-        self.not_before_s = 0.0
-        """Monotonic time before which no attempt is made."""
+        self.asked = False
+        """Whether somebody asked for it to be connected, as opposed to an option that wants all or some."""
+        self.twin: Device | None = None
+        """The connected device for whose sake this one was turned away."""
         self.task: asyncio.Task[None] | None = None
-        self._failures = 0
+        self._patience = patience
+        self._standing = Standing(state=State.LOST if rssi_dbm is None else State.SEEN)
+        self._fault: LinkFault | None = None
+        """Why the last attempt failed or the last link was lost."""
+        self._moved_s = self._heard_s = time.monotonic()
         self._told_s = 0.0
 
     @property
@@ -52,9 +72,31 @@ class Device:
         return self.session.tracker.info.device or self.address
 
     @property
+    def is_provisional(self) -> bool:
+        """Whether the device has not told its id yet."""
+        return self.session.tracker.info.device is None
+
+    @property
+    def is_forgettable(self) -> bool:
+        """Whether it is but an address that has not been heard for long: a private one, changed since."""
+        return self.is_provisional and self.state in WAITING and time.monotonic() - self._heard_s >= FORGET_S
+
+    @property
+    def state(self) -> State:
+        """Where its connection stands."""
+        return self._standing.state
+
+    @property
+    def not_before_s(self) -> float:
+        """Monotonic time before which no attempt is made."""
+        return self._standing.not_before_s
+
+    @property
     def is_due(self) -> bool:
         """Whether an advertisement should start an attempt now."""
-        return self.wanted and self.state in WAITING and time.monotonic() >= self.not_before_s
+        if not self.wanted:
+            return False
+        return self._standing.is_due(time.monotonic()) or (self.state in WAITING and self._twin_is_gone())
 
     def count_with(self, lineup: Lineup) -> None:
         """Go on with these counters; CounterError where the device is known to lack what the primary needs."""
@@ -75,29 +117,44 @@ class Device:
             raise CounterError(why)
         return self.calibrations.begin(plan)
 
-    def heard(self, sighting: Sighting, *, tell_every_s: float) -> None:
+    def heard(self, name: str | None, rssi_dbm: int, *, tell_every_s: float) -> None:
         """Take an advertisement."""
-        self.name, self.rssi_dbm = sighting.name or self.name, sighting.rssi_dbm
+        self.name, self.rssi_dbm = name or self.name, rssi_dbm
+        self._heard_s = time.monotonic()
         if time.monotonic() - self._told_s >= tell_every_s:
-            self._told_s = time.monotonic()
-            self.session.tell(DeviceChanged(), time.time_ns())
+            self.describe()
 
-    def move(self, cause: Cause, reason: str | None = None) -> None:
+    def moved_to(self, other: Device) -> None:
+        """Go on under the address of `other`, which turned out to be this one."""
+        self.address, self.name, self.rssi_dbm = other.address, other.name or self.name, other.rssi_dbm
+        if other.asked and not self.wanted:
+            self.want()
+        self.describe()
+
+    def describe(self) -> None:
+        """Tell that the device's description has changed."""
+        self._told_s = time.monotonic()
+        self.session.tell(DeviceChanged(), time.time_ns())
+
+    def move(self, cause: Cause, reason: str | None = None, *, least_s: float = 0.0) -> None:
         """Move the connection's state on, and tell."""
-        self.state = advance(self.state, cause)
+        self._moved_s = time.monotonic()
+        how = {"jitter": random.random(), "least_s": least_s}  # noqa: S311  # no secret
+        self._standing = self._standing.after(cause, now_s=self._moved_s, patience=self._patience, **how)
         self.reason, self.since_ns = reason, time.time_ns()
         self.session.state_changed(self.state, reason)
 
     def want(self) -> None:
         """Have it connected as soon as it is heard."""
-        self.wanted = True
-        self.not_before_s, self._failures = 0.0, 0
+        self.wanted = self.asked = True
         if self.state is State.DISCONNECTED:
             self.move(Cause.WANTED)
+        else:
+            self._standing = self._standing.after(Cause.WANTED, now_s=time.monotonic())
 
     def unwant(self) -> None:
         """Close its link and leave it alone."""
-        self.wanted = False
+        self.wanted = self.asked = False
         self.move(Cause.UNWANTED)
         self.stop()
 
@@ -106,27 +163,23 @@ class Device:
         if self.task is not None:
             self.task.cancel()
 
-    async def run(self, link: Link, settled: asyncio.Event, jitter: Callable[[], float]) -> None:
-        """Hold the link until it is lost or no longer wanted; `settled` is set once it is connected or has failed."""
-        connected_s: float | None = None
-        try:
-            async with link:
-                connected_s = time.monotonic()
-                self.move(Cause.CONNECTED)
-                settled.set()
-                await self.session.follow(link)
-        except LinkError as error:
-            self._lost(error.why, connected_s, jitter())
-        except Exception as error:
-            logger.exception("link of %s", self.address)
-            self._lost(f"an internal error: {error!r}", connected_s, jitter())
+    async def run(self, link: Link, on_connected: Callable[[], None]) -> None:
+        """Follow an open link until it is lost (LinkError) or the task is cancelled."""
+        self.move(Cause.CONNECTED)
+        self.twin = None
+        on_connected()
+        await self.session.follow(link)
 
-    def _lost(self, why: str, connected_s: float | None, jitter: float) -> None:
-        """Note that the link failed or was lost, and when to try again."""
+    def lost(self, error: LinkError) -> None:
+        """Note that the link failed or was lost, and why; nothing where it is not wanted any more."""
         if self.state not in LINKED:
             return
-        if connected_s is not None and time.monotonic() - connected_s >= HEALTHY_S:
-            self._failures = 0
-        self._failures += 1
-        self.not_before_s = time.monotonic() + backoff_s(self._failures, jitter)
-        self.move(Cause.FAILED if connected_s is None else Cause.DROPPED, why)
+        # What BlueZ remembered of the services has been forgotten: once more at once, from then on with patience.
+        again = error.reason is LinkFault.NOT_OURS and self._fault is LinkFault.NOT_OURS
+        least_s = TWIN_WAIT_S if error.reason is LinkFault.TWIN else self._patience.cap_s if again else 0.0
+        self._fault = error.reason
+        self.move(Cause.FAILED if self.state is State.CONNECTING else Cause.DROPPED, error.why, least_s=least_s)
+
+    def _twin_is_gone(self) -> bool:
+        twin = self.twin
+        return twin is not None and twin.state not in LINKED and time.monotonic() - twin._moved_s >= TWIN_GRACE_S  # noqa: SLF001  # its own kind

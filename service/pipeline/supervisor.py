@@ -1,8 +1,9 @@
-"""The supervisor: knows every device, keeps the wanted ones connected, one connect at a time.
+"""The supervisor: knows every device, keeps the wanted ones connected for ever, one connect at a time.
 
 It scans until a wanted device is heard whose back-off has passed, stops the scanner (adapters do one thing at a time),
 connects from that fresh scan result, and scans on. Each link lives in a task of its own; a lost one leaves its session
-as it is and the device is looked for again. No Bluetooth at all is a state that is told, and tried again.
+as it is and the device is looked for again. A device that turns out to be one known already, under another address, is
+that one: see the roster. No Bluetooth at all is a state that is told, and tried again.
 """
 
 from __future__ import annotations
@@ -10,15 +11,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import random
 from collections.abc import AsyncIterator, Callable, Collection
 
-from service.errors import LinkError, UnknownDeviceError
-from service.links.ble import PLATFORM, Backend, BleLink, Sighting, scanning
+from service.errors import LinkError, LinkFault
+from service.links.ble import DEFAULT_TIMEOUTS, PLATFORM, Backend, BleLink, Sighting, Timeouts, close_stale, scanning
+from service.links.contract import Link
 from service.pipeline.device import Device
 from service.pipeline.hub import Hub
-from service.pipeline.lifecycle import Cause
+from service.pipeline.lifecycle import LINKED, PATIENCE, Cause, Patience
 from service.pipeline.lineup import Lineup
+from service.pipeline.roster import Roster, told_id
 from service.wearables.contract import Wearable
 
 SCANNER_RETRY_S = 2.0
@@ -46,6 +48,8 @@ class Supervisor:
         lineup: Lineup,
         wanted: Collection[str] | None = None,
         backend: Backend = PLATFORM,
+        timeouts: Timeouts = DEFAULT_TIMEOUTS,
+        patience: Patience = PATIENCE,
     ) -> None:
         self.hub = hub
         self.trouble: LinkError | None = None
@@ -54,20 +58,26 @@ class Supervisor:
         self._lineup = lineup
         self._wanted = None if wanted is None else frozenset(word.casefold() for word in wanted)
         self._backend = backend
-        self._devices: dict[str, Device] = {}
-        """By address."""
+        self._timeouts = timeouts
+        self._patience = patience
+        self._roster = Roster()
 
     @property
     def devices(self) -> list[Device]:
-        """Every device heard or connected since the start, in that order."""
-        return list(self._devices.values())
+        """Every device remembered, heard or connected, in that order."""
+        return self._roster.devices
 
     def device(self, key: str) -> Device:
         """Return the device with this id or address; UnknownDeviceError where there is none."""
-        for device in self._devices.values():
-            if key in {device.id, device.address}:
-                return device
-        raise UnknownDeviceError(key)
+        return self._roster.find(key)
+
+    def remember(self, device: Device) -> None:
+        """Take in a device of an earlier run, its session restored: it is wanted, and lost until it is heard.
+
+        To be called before `running`; ValueError where the device is known already.
+        """
+        self._roster.add(device)
+        device.wanted = True
 
     def connect(self, key: str) -> Device:
         """Want a device connected; it happens as soon as it is heard, without waiting for a back-off."""
@@ -90,11 +100,12 @@ class Supervisor:
             try:
                 yield
             finally:
-                for device in self._devices.values():
+                for device in self._roster.devices:
                     device.stop()
                 loop.cancel()
 
     async def _run(self, tasks: asyncio.TaskGroup) -> None:
+        await close_stale([device.address for device in self._roster.devices], self._backend)
         while True:
             try:
                 await self._connect(*await self._hear_one_due(), tasks)
@@ -111,7 +122,8 @@ class Supervisor:
         """Scan until a device is heard that should be connected now."""
         services = self._make_wearable().services
         while True:
-            async with scanning(services, self._backend) as sightings:
+            self._roster.forget()
+            async with scanning(services, self._backend, self._timeouts) as sightings:
                 self.trouble = None
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(SCAN_STRETCH_S):
@@ -120,14 +132,24 @@ class Supervisor:
                                 return device, sighting
 
     def _heard(self, sighting: Sighting) -> Device:
-        device = self._devices.get(sighting.address)
+        device = self._roster.at(sighting.address)
         if device is None:
-            wearable = self._make_wearable()
-            device = Device(sighting, wearable, self._lineup, self.hub.publish)
+            device = self._new(sighting.address, sighting.name, sighting.rssi_dbm)
             device.wanted = self._is_wanted(sighting)
-            self._devices[sighting.address] = device
-        device.heard(sighting, tell_every_s=SEEN_EVERY_S)
+            self._roster.add(device)
+        device.heard(sighting.name, sighting.rssi_dbm, tell_every_s=SEEN_EVERY_S)
         return device
+
+    def _new(self, address: str, name: str | None = None, rssi_dbm: int | None = None) -> Device:
+        return Device(
+            address=address,
+            name=name,
+            rssi_dbm=rssi_dbm,
+            wearable=self._make_wearable(),
+            lineup=self._lineup,
+            publish=self.hub.publish,
+            patience=self._patience,
+        )
 
     def _is_wanted(self, sighting: Sighting) -> bool:
         if self._wanted is None:
@@ -142,7 +164,43 @@ class Supervisor:
             return
         settled = asyncio.Event()
         device.move(Cause.ATTEMPT)
-        link = BleLink(sighting.handle, device.wearable.handshake(), self._backend)
-        device.task = tasks.create_task(device.run(link, settled, random.random), name=f"link {device.address}")
+        link = BleLink(sighting.handle, device.wearable.handshake(), self._backend, self._timeouts)
+        device.task = tasks.create_task(self._hold(device, link, settled), name=f"link {device.address}")
         device.task.add_done_callback(lambda _: settled.set())
         await settled.wait()
+
+    async def _hold(self, device: Device, link: Link, settled: asyncio.Event) -> None:
+        """Hold a link until it is lost or its device no longer wanted; `settled` is set once it is connected."""
+        try:
+            async with link:
+                device = self._introduced(device, link)
+                if device.wanted:
+                    await device.run(link, settled.set)
+        except LinkError as error:
+            fault = error
+        except Exception as error:
+            logger.exception("link of %s", device.address)
+            fault = LinkError(LinkFault.REFUSED, f"an internal error: {error!r}")
+        else:
+            return
+        if device.task is asyncio.current_task():  # else it has another link by now
+            device.lost(fault)
+
+    def _introduced(self, device: Device, link: Link) -> Device:
+        """Return whose link it is, now that it told its id: the device dialled, or one known from elsewhere.
+
+        LinkError where that one is connected already.
+        """
+        owner = self._roster.owner(device, told_id(self._make_wearable(), link.said), self._new)
+        if owner is device:
+            return device
+        if owner.state in LINKED:
+            device.twin = owner
+            raise LinkError(LinkFault.TWIN, f"it calls itself {owner.id}, which is connected from {owner.address}")
+        logger.info("%s is at %s now, it was at %s", owner.id, device.address, owner.address)
+        owner.task, device.task = device.task, None
+        owner.wanted = owner.wanted or owner not in self._roster.devices
+        self._roster.hand_over(device, owner)
+        if owner.wanted:
+            owner.move(Cause.ATTEMPT)
+        return owner

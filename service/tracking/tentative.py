@@ -25,6 +25,11 @@ class TentativeSteps:
         """What was told and neither confirmed nor retracted, by device time."""
         self._confirmed_s: float | None = None
 
+    @property
+    def open(self) -> dict[float, Tentative]:
+        """What was told and neither confirmed nor retracted, by device time."""
+        return self._open
+
     def follow(self, counter: str, boot: int, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Tentative]:
         """Return the events that lead from what was told to `counter`'s `likely` and to its steps `confirmed` now."""
         if not likely and not self._open and not confirmed:

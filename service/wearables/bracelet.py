@@ -11,6 +11,14 @@ Service `5e9a0001-4b1d-4c0e-8f3a-73746570b001`; all numbers little endian; every
 | device id | 0006 | read   | 1–20 bytes of UTF-8, the same for ever |
 | clock     | 0007 | read   | u32 index of a sample (a multiple of 128), u64 tick at it |
 | sensors   | 0008 | read   | what it measures, below; without this characteristic acceleration only |
+| control   | 0009 | write, indicate | requests and answers, tabled in `service.wearables.bracelet_control` |
+| history   | 000a | read   | u32, how many of its newest samples it keeps and sends again; 0: none |
+| register  | 000b | read, notify | u32, steps its own simple counter has counted since boot |
+| utc       | 000c | read   | u64, ms since 1970 by its own clock; 0 until it knows the time |
+
+Those from 0008 on may be missing. With `control` a device sends data between the requests start and stop only, and a
+new connection begins stopped; without it, to whoever subscribes to data. A host subscribes to control, then to data,
+then writes start.
 
 | packet at | type | field |
 | --- | --- | --- |
@@ -36,7 +44,8 @@ A packet tells by itself what its samples hold. Where one sample of all sensors 
 out and the rest sent; who needs m asks for a larger MTU. Axes are the same for all three, right-handed.
 The index counts samples, not packets, and the tick is taken at every 128th sample only: so packets of any size say the
 same about the same samples. A value outside i16 is sent as its limit, and one at its limit is taken for saturated.
-Beside it stand the standard Battery (180F) and Device Information (180A) services.
+Samples sent again (bit 4) have the numbers, ticks and values they had; they come in order, between live packets.
+Beside it stand the standard Battery (180F), Device Information (180A) and perhaps Running Speed and Cadence (1814).
 """
 
 from __future__ import annotations
@@ -46,47 +55,100 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from service.errors import ParameterError, WireError, WireFault
-from service.samples import ACCELEROMETER_ONLY, TICK_EVERY, Columns, DeviceInfo, RawBlock, Sensor, Sensors
+from service.errors import WireError, WireFault
+from service.samples import ACCELEROMETER_ONLY, TICK_EVERY, Columns, DeviceInfo, RawBlock, Reply, Sensor, Sensors
+from service.wearables import bracelet_control as control
+from service.wearables.bracelet_values import (
+    BATTERY_LEVEL,
+    BOOT,
+    CLOCK,
+    CONTROL,
+    DATA,
+    DEVICE_ID,
+    FIRMWARE_REVISION,
+    HISTORY,
+    MANUFACTURER_NAME,
+    MODEL_NUMBER,
+    RATE,
+    REGISTER,
+    SCALE,
+    SENSORS,
+    SENSORS_LAYOUT,
+    SERVICE,
+    UTC,
+    decode_battery,
+    decode_clock,
+    decode_device_id,
+    decode_history,
+    decode_rate,
+    decode_register,
+    encode_boot,
+    encode_clock,
+    encode_device_id,
+    encode_history,
+    encode_rate,
+    encode_register,
+    encode_scale,
+    encode_sensors,
+    encode_utc,
+    fixed,
+    text,
+)
 from service.wearables.contract import Action, Read, Subscribe, Write
 
-
-def _uuid(number: int) -> str:
-    return f"5e9a{number:04x}-4b1d-4c0e-8f3a-73746570b001"
-
-
-def _sig(number: int) -> str:
-    return f"0000{number:04x}-0000-1000-8000-00805f9b34fb"
-
-
-SERVICE: Final = _uuid(1)
-DATA: Final = _uuid(2)
-SCALE: Final = _uuid(3)
-RATE: Final = _uuid(4)
-BOOT: Final = _uuid(5)
-DEVICE_ID: Final = _uuid(6)
-CLOCK: Final = _uuid(7)
-SENSORS: Final = _uuid(8)
-BATTERY_LEVEL: Final = _sig(0x2A19)
-MANUFACTURER_NAME: Final = _sig(0x2A29)
-MODEL_NUMBER: Final = _sig(0x2A24)
-FIRMWARE_REVISION: Final = _sig(0x2A26)
+__all__ = [
+    "ATT_HEADER",
+    "BATTERY_LEVEL",
+    "BOOT",
+    "CLOCK",
+    "CONTROL",
+    "DATA",
+    "DEFAULT_LSB_PER_100_UT",
+    "DEFAULT_LSB_PER_G",
+    "DEFAULT_LSB_PER_RAD_S",
+    "DEVICE_ID",
+    "FIRMWARE_REVISION",
+    "FLAG_GYROSCOPE",
+    "FLAG_HISTORY",
+    "FLAG_MAGNETOMETER",
+    "HISTORY",
+    "MANUFACTURER_NAME",
+    "MODEL_NUMBER",
+    "RATE",
+    "REGISTER",
+    "SCALE",
+    "SENSORS",
+    "SERVICE",
+    "UTC",
+    "VERSION",
+    "Bracelet",
+    "DataPacket",
+    "encode",
+    "encode_boot",
+    "encode_clock",
+    "encode_device_id",
+    "encode_history",
+    "encode_rate",
+    "encode_register",
+    "encode_scale",
+    "encode_sensors",
+    "encode_utc",
+    "packet_sensors",
+    "samples_per_packet",
+    "tick_index",
+]
 
 VERSION: Final = 1
 FLAG_HISTORY: Final = 0x10
 FLAG_GYROSCOPE: Final = 0x20
 FLAG_MAGNETOMETER: Final = 0x40
 _FLAGS_RESERVED: Final = 0x80
-ID_RULE: Final = "1 to 20 bytes of printable UTF-8 without /"
 ATT_HEADER: Final = 3
 """Bytes of a notification that are not value: op code and handle."""
 _HEADER: Final = struct.Struct("<BBIH")
-_SENSORS: Final = struct.Struct("<BHH")
 _TRIPLE_BYTES: Final = 6
 _I16_MIN, _I16_MAX = -32768, 32767
 _LOWEST, _HIGHEST = struct.pack("<h", _I16_MIN), struct.pack("<h", _I16_MAX)
-LONGEST_UPTIME_TICKS: Final = 1 << 42
-"""136 years: no device runs longer, and device time stays exact to far below a sample."""
 DEFAULT_LSB_PER_G: Final = 4096
 """±8 g in 16 bits: running on the wrist passes ±4 g."""
 DEFAULT_LSB_PER_RAD_S: Final = 900
@@ -146,42 +208,6 @@ def encode(packet: DataPacket) -> bytes:
     return header + struct.pack(f"<{len(flat)}h", *flat)
 
 
-def encode_scale(lsb_per_g: int) -> bytes:
-    """Return the scale characteristic's value; `lsb_per_g` 1…65535."""
-    return struct.pack("<H", lsb_per_g)
-
-
-def encode_rate(rate_hz: float) -> bytes:
-    """Return the rate characteristic's value; `rate_hz` 0.01…655.35."""
-    return struct.pack("<H", round(rate_hz * 100))
-
-
-def encode_boot(boot: int) -> bytes:
-    """Return the boot characteristic's value."""
-    return struct.pack("<I", boot & 0xFFFFFFFF)
-
-
-def encode_device_id(device: str) -> bytes:
-    """Return the device id characteristic's value; ParameterError where the id breaks its rule."""
-    data = device.encode()
-    if not _valid_id(device, data):
-        raise ParameterError("device_id", device, ID_RULE)
-    return data
-
-
-def encode_clock(index: int, tick: int) -> bytes:
-    """Return the clock characteristic's value: the full tick at sample `index`, a multiple of 128."""
-    return struct.pack("<IQ", index & 0xFFFFFFFF, tick)
-
-
-def encode_sensors(sensors: Sensors, *, lsb_per_rad_s: int, lsb_per_100_ut: int) -> bytes:
-    """Return the sensors characteristic's value; scales 1…65535, those of sensors that are not there are left out."""
-    mask = sum(1 << bit for bit, sensor in enumerate(Sensor) if sensor in sensors)
-    gyroscope = lsb_per_rad_s if Sensor.GYROSCOPE in sensors else 0
-    magnetometer = lsb_per_100_ut if Sensor.MAGNETOMETER in sensors else 0
-    return _SENSORS.pack(mask, gyroscope, magnetometer)
-
-
 class Bracelet:
     """The host's side of the protocol: what to do after connecting, and bytes to samples."""
 
@@ -192,42 +218,51 @@ class Bracelet:
         self._scales: dict[Sensor, float] = {}
         """LSB per unit of each sensor whose scale was read."""
         self._boot: int | None = None
-        self._readers: dict[str, Callable[[bytes], RawBlock | DeviceInfo]] = {
+        self._keeps = False
+        """Whether it keeps samples to send again."""
+        self._readers: dict[str, Callable[[bytes], RawBlock | DeviceInfo | Reply]] = {
             DATA: self._data,
             SCALE: self._scale,
-            RATE: _rate,
+            RATE: decode_rate,
             BOOT: self._boot_number,
-            DEVICE_ID: _device_id,
-            CLOCK: _clock,
+            DEVICE_ID: decode_device_id,
+            CLOCK: decode_clock,
             SENSORS: self._sensors_told,
-            BATTERY_LEVEL: _battery,
-            MANUFACTURER_NAME: lambda data: DeviceInfo(manufacturer=_text(data, MANUFACTURER_NAME)),
-            MODEL_NUMBER: lambda data: DeviceInfo(model=_text(data, MODEL_NUMBER)),
-            FIRMWARE_REVISION: lambda data: DeviceInfo(firmware=_text(data, FIRMWARE_REVISION)),
+            BATTERY_LEVEL: decode_battery,
+            HISTORY: self._history_told,
+            REGISTER: decode_register,
+            CONTROL: control.reply,
+            MANUFACTURER_NAME: lambda data: DeviceInfo(manufacturer=text(data, MANUFACTURER_NAME)),
+            MODEL_NUMBER: lambda data: DeviceInfo(model=text(data, MODEL_NUMBER)),
+            FIRMWARE_REVISION: lambda data: DeviceInfo(firmware=text(data, FIRMWARE_REVISION)),
         }
 
     def handshake(self) -> Sequence[Action]:
-        """Read who, how fast and how large; then subscribe. The standard services may be missing."""
+        """Read who, how fast and how large; subscribe; begin. What old firmware or a plain one lacks is optional."""
+        optional = (MANUFACTURER_NAME, MODEL_NUMBER, FIRMWARE_REVISION, BATTERY_LEVEL, HISTORY, REGISTER)
         return (
             *(Read(characteristic=uuid) for uuid in (DEVICE_ID, BOOT)),
             Read(characteristic=SENSORS, optional=True),
             *(Read(characteristic=uuid) for uuid in (SCALE, RATE, CLOCK)),
-            *(
-                Read(characteristic=uuid, optional=True)
-                for uuid in (MANUFACTURER_NAME, MODEL_NUMBER, FIRMWARE_REVISION, BATTERY_LEVEL)
-            ),
-            Subscribe(characteristic=BATTERY_LEVEL, optional=True),
+            *(Read(characteristic=uuid, optional=True) for uuid in optional),
+            *(Subscribe(characteristic=uuid, optional=True) for uuid in (CONTROL, BATTERY_LEVEL, REGISTER)),
             Subscribe(characteristic=DATA),
+            control.start(),
         )
 
-    def feed(self, characteristic: str, data: bytes) -> RawBlock | DeviceInfo | None:
+    def feed(self, characteristic: str, data: bytes) -> RawBlock | DeviceInfo | Reply | None:
         """Decode one value; WireError where it breaks the format, None for a characteristic that is not ours."""
         reader = self._readers.get(characteristic)
         return None if reader is None else reader(data)
 
-    def history(self, boot: int, first: int, samples: int) -> Sequence[Write]:  # noqa: ARG002
-        """Return nothing: this bracelet keeps no history yet."""
-        return ()
+    def history(self, boot: int, first: int, samples: int) -> Sequence[Write]:
+        """Return the request for samples again; nothing where this bracelet keeps none."""
+        return (control.report(boot, first, samples),) if self._keeps and samples > 0 else ()
+
+    def _history_told(self, data: bytes) -> DeviceInfo:
+        said = decode_history(data)
+        self._keeps = bool(said.history_samples)
+        return said
 
     def _data(self, data: bytes) -> RawBlock:
         if len(data) < _HEADER.size:
@@ -265,18 +300,18 @@ class Bracelet:
         return (known + (low - known) % 256) & 0xFFFFFFFF
 
     def _boot_number(self, data: bytes) -> DeviceInfo:
-        (self._boot,) = _fixed("<I", data, BOOT)
+        (self._boot,) = fixed("<I", data, BOOT)
         return DeviceInfo(boot=self._boot)
 
     def _scale(self, data: bytes) -> DeviceInfo:
-        (lsb_per_g,) = _fixed("<H", data, SCALE)
+        (lsb_per_g,) = fixed("<H", data, SCALE)
         if lsb_per_g == 0:
             raise WireError(WireFault.VALUE, "a scale of 0 LSB per g")
         self._scales[Sensor.ACCELEROMETER] = float(lsb_per_g)
         return DeviceInfo(lsb_per_g=float(lsb_per_g), sensors=self._sensors)
 
     def _sensors_told(self, data: bytes) -> DeviceInfo:
-        mask, *scales = _fixed(_SENSORS.format, data, SENSORS)
+        mask, *scales = fixed(SENSORS_LAYOUT, data, SENSORS)
         if not mask & 1 or mask >> len(Sensor):
             raise WireError(WireFault.VALUE, f"sensors {mask:#04x}; bit 0 is set and bits 3–7 are not")
         sensors = tuple(sensor for bit, sensor in enumerate(Sensor) if mask >> bit & 1)
@@ -304,51 +339,3 @@ def _saturated(data: bytes, values: tuple[int, ...], held: Sensors) -> Sequence[
     if _LOWEST not in data and _HIGHEST not in data:
         return ()
     return sorted({i // (3 * len(held)) for i, value in enumerate(values) if value in {_I16_MIN, _I16_MAX}})
-
-
-def _rate(data: bytes) -> DeviceInfo:
-    (hundredths,) = _fixed("<H", data, RATE)
-    if not 100 <= hundredths <= 40_000:
-        raise WireError(WireFault.VALUE, f"a rate of {hundredths / 100} Hz; 1 to 400 are valid")
-    return DeviceInfo(rate_hz=hundredths / 100)
-
-
-def _clock(data: bytes) -> DeviceInfo:
-    index, tick = _fixed("<IQ", data, CLOCK)
-    if index % TICK_EVERY:
-        raise WireError(WireFault.VALUE, f"a clock at sample {index}, no multiple of {TICK_EVERY}")
-    if tick >= LONGEST_UPTIME_TICKS:
-        raise WireError(WireFault.VALUE, f"a clock of {tick} ticks, more than a hundred years after boot")
-    return DeviceInfo(clock=(index, tick))
-
-
-def _battery(data: bytes) -> DeviceInfo:
-    (percent,) = _fixed("<B", data, BATTERY_LEVEL)
-    if percent > 100:
-        raise WireError(WireFault.VALUE, f"a battery at {percent} %")
-    return DeviceInfo(battery_percent=percent)
-
-
-def _device_id(data: bytes) -> DeviceInfo:
-    text = _text(data, DEVICE_ID)
-    if not _valid_id(text, data):
-        raise WireError(WireFault.VALUE, f"a device id of {len(data)} bytes; {ID_RULE} are valid")
-    return DeviceInfo(device=text)
-
-
-def _valid_id(text: str, data: bytes) -> bool:
-    return 1 <= len(data) <= 20 and text.isprintable() and "/" not in text
-
-
-def _text(data: bytes, characteristic: str) -> str:
-    try:
-        return data.decode("utf-8").rstrip("\0")
-    except UnicodeDecodeError:
-        raise WireError(WireFault.VALUE, f"{characteristic} is no UTF-8") from None
-
-
-def _fixed(layout: str, data: bytes, characteristic: str) -> tuple[int, ...]:
-    if len(data) != struct.calcsize(layout):
-        raise WireError(WireFault.LENGTH, f"{characteristic}: {len(data)} bytes, not {struct.calcsize(layout)}")
-    values: tuple[int, ...] = struct.unpack(layout, data)
-    return values

@@ -43,7 +43,8 @@ async def standing(*schedules, **options):
     """The API over one device for each schedule: sim-1, sim-2 and so on."""
     stands = [Stand(schedule, device_id=f"sim-{n}", seed=n, **options) for n, schedule in enumerate(schedules, 1)]
     supervisor = Supervisor(hub=Hub(durable_limit=1000), make_wearable=Bracelet, lineup=lineup("double_threshold"))
-    supervisor._devices = {stand.device.address: stand.device for stand in stands}
+    for stand in stands:
+        supervisor.remember(stand.device)
     app = create_app(supervisor, Trials(lambda: stands[0].now_ns, lambda: stands[0].now_ns))
     transport = httpx.ASGITransport(app=app)
     async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as http:

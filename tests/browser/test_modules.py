@@ -212,3 +212,21 @@ def test_a_session_begun_anew_begins_its_trace_anew(run: Run) -> None:
     }
     return shown;"""
     assert run(body) == [4, 4, 0]
+
+
+def test_a_known_device_under_a_new_address_is_one_card(run: Run) -> None:
+    """The card that the new address had for a moment goes; one that only tells the same id stays."""
+    body = """
+    const { Devices } = await import("/web/devices.js");
+    const devices = new Devices();
+    const tell = (id, address) => devices.apply({ type: "device", value: { id, address, reboots: 0, steps: 7 } }, 0);
+    const shown = () => devices.all.map(({ device }) => [device.id, device.address]);
+    tell("a", "A");
+    tell("B", "B");
+    const before = shown();
+    tell("a", "B");
+    const moved = shown();
+    tell("C", "C");
+    tell("a", "B");
+    return [before, moved, shown()];"""
+    assert run(body) == [[["a", "A"], ["B", "B"]], [["a", "B"]], [["a", "B"], ["C", "C"]]]

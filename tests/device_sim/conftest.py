@@ -10,8 +10,9 @@ from bleak import BleakClient, BleakScanner
 from device_sim.air import LocalAir
 from device_sim.air_tcp import AirServer, RemoteAir
 from device_sim.bracelet import Bracelet
-from service.samples import ACCELEROMETER_ONLY, RawBlock
+from service.samples import ACCELEROMETER_ONLY, RawBlock, Reply
 from service.wearables import bracelet as wire
+from service.wearables import bracelet_control as control
 
 
 class Known:
@@ -28,6 +29,9 @@ class Known:
         block = self.acc_g[self.next : self.next + n]
         self.next += len(block)
         return block
+
+    def true_steps_until(self, _t_s):
+        return None
 
 
 class Endless(Known):
@@ -56,12 +60,15 @@ class Host:
         self.client = client
         self.decoder = wire.Bracelet()
         self.blocks = []
+        self.again = []
+        self.replies = []
         self.gone = 0
 
     @classmethod
     async def connect(cls, central, *, device=None, timeout=5.0, **options):  # noqa: ASYNC109
         device = device or await seen(central)
         host = cls(None)
+        host.central = central
         host.client = BleakClient(device, host._on_gone, backend=central.client, timeout=timeout, **options)
         await host.client.connect()
         return host
@@ -80,12 +87,32 @@ class Host:
 
     async def subscribe(self):
         await self.describe()
+        await self.listen()
+
+    async def listen(self):
+        """Subscribe and begin, as the handshake has it; a bracelet without a control point begins by itself."""
         await self.client.start_notify(wire.DATA, self._take)
+        if self.client.services.get_characteristic(wire.CONTROL) is not None:
+            await self.enable_answers()
+            assert (await self.ask(control.start())).accepted
+
+    async def enable_answers(self):
+        await self.client.start_notify(wire.CONTROL, self._take)
+
+    async def ask(self, write, *, within_s=5.0):
+        """Write a request and return its answer."""
+        before = len(self.replies)
+        await self.client.write_gatt_char(write.characteristic, write.data, response=True)
+        await self.until(lambda: len(self.replies) > before, within_s=within_s)
+        return self.replies[-1]
 
     def _take(self, characteristic, data):
-        block = self.decoder.feed(characteristic.uuid, bytes(data))
-        assert isinstance(block, RawBlock)
-        self.blocks.append(block)
+        said = self.decoder.feed(characteristic.uuid, bytes(data))
+        if isinstance(said, Reply):
+            self.replies.append(said)
+            return
+        assert isinstance(said, RawBlock)
+        (self.again if said.history else self.blocks).append(said)
 
     @property
     def samples(self):

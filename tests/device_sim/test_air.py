@@ -29,6 +29,8 @@ class Still:
     sensors = ("accelerometer",)
     def read(self, n):
         return np.zeros((n, 3))
+    def true_steps_until(self, t_s):
+        return 0
 
 async def main():
     async with open_air(sys.argv[1]).bracelet(Bracelet(Still(), device_id="other"), name="other"):

@@ -14,6 +14,7 @@ from bleak_retry_connector import establish_connection
 from device_sim.bracelet import Bracelet, quantise
 from device_sim.gatt import Start
 from service.wearables import bracelet as wire
+from service.wearables import bracelet_control as control
 
 CCCD = "00002902-0000-1000-8000-00805f9b34fb"
 
@@ -42,7 +43,7 @@ async def test_everything_a_host_reads_is_what_the_bracelet_is(on_air, radio):
         assert infos[wire.CLOCK].clock[0] % 128 == 0
         assert infos[wire.BATTERY_LEVEL].battery_percent == 100
         assert infos[wire.MANUFACTURER_NAME].manufacturer == "steplink"
-        assert {infos[wire.MODEL_NUMBER].model, infos[wire.FIRMWARE_REVISION].firmware} == {"simulated bracelet", "1"}
+        assert {infos[wire.MODEL_NUMBER].model, infos[wire.FIRMWARE_REVISION].firmware} == {"simulated bracelet", "2"}
         await host.client.disconnect()
 
 
@@ -325,6 +326,8 @@ async def test_descriptors_are_read_and_written(on_air, radio):
         assert cccd.uuid == CCCD
         assert bytes(await host.client.read_gatt_descriptor(cccd.handle)) == b"\0\0"
         await host.client._backend.write_gatt_descriptor(cccd, b"\1\0")  # bleak itself leaves this one to start_notify
+        await host.enable_answers()
+        await host.ask(control.start())
         assert gatt.subscribed
         assert bytes(await host.client.read_gatt_descriptor(cccd.handle)) == b"\1\0"
 

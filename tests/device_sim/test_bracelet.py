@@ -67,6 +67,9 @@ def radio_known():
             self.taken += len(block)
             return block
 
+        def true_steps_until(self, _t_s):
+            return None
+
     return Source
 
 
@@ -89,19 +92,23 @@ def test_the_end_of_the_source_sends_the_rest(radio):
     assert [len(block) for block in drain(bracelet, host(bracelet))] == [10, 3]
 
 
-def test_what_nobody_takes_is_lost_and_its_numbers_are_not_given_again(radio):
-    bracelet = Bracelet(radio.Known(100), packet_samples=10)
+@pytest.mark.parametrize(("history_s", "lost"), [(0, 25), (0.4, 5), (600, 0)])
+def test_what_nobody_takes_is_kept_while_there_is_room_and_its_numbers_are_not_given_again(radio, history_s, lost):
+    bracelet = Bracelet(radio.Known(100), packet_samples=10, history_s=history_s)
     bracelet.measure(25)
     bracelet.discard()
+    statistics = bracelet.statistics()
+    assert (statistics.lost, statistics.waiting) == (lost, 25 - lost)
     bracelet.measure(10)
     assert [block.index for block in drain(bracelet, host(bracelet))] == [25]
-    assert (bracelet.statistics().lost, bracelet.statistics().sent) == (25, 10)
+    assert (bracelet.statistics().lost, bracelet.statistics().sent) == (lost, 10)
 
 
-def test_a_full_buffer_loses_the_oldest(radio):
-    bracelet = Bracelet(radio.Endless())
+@pytest.mark.parametrize(("history_s", "lost"), [(0, 30), (600, 0)])
+def test_what_waits_too_long_for_the_radio_is_left_to_history(radio, history_s, lost):
+    bracelet = Bracelet(radio.Endless(), history_s=history_s)
     bracelet.measure(BUFFER_SAMPLES + 30)
-    assert bracelet.statistics().lost == 30
+    assert bracelet.statistics().lost == lost
     assert drain(bracelet, host(bracelet))[0].index == 30
 
 
@@ -112,6 +119,9 @@ def test_values_beyond_the_range_are_sent_as_its_limit():
 
         def read(self, n):
             return np.tile([9.0, -9.0, 1.0], (n, 1))
+
+        def true_steps_until(self, _t_s):
+            return 0
 
     bracelet = Bracelet(Shaken())
     bracelet.measure(10)
@@ -176,6 +186,9 @@ def turned(n, sensors, seed=0):
             block = self.values[self.taken : self.taken + n]
             self.taken += len(block)
             return block
+
+        def true_steps_until(self, _t_s):
+            return None
 
     Source.sensors = sensors
     rng = np.random.default_rng(seed)

@@ -48,8 +48,14 @@ async def test_a_connect_cancelled_in_the_turn_in_which_the_link_is_made_leaves_
 
 async def test_a_subscription_that_is_told_after_its_link_has_ended_is_none(stage):
     gatt, _, _ = stage
-    gatt._peripheral._on_subscription(object(), notify=True, _indicate=False)
-    assert not gatt.subscribed
+    peripheral, ended = gatt._peripheral, object()
+    peripheral._on_data_subscription(ended, notify=True, _indicate=False)
+    peripheral._on_control_subscription(ended, _notify=False, indicate=True)
+    peripheral._on_request(ended, b"\x01")
+    assert not (peripheral._subscribed)
+    assert not (peripheral._indicated)
+    assert not (peripheral.control.streaming)
+    assert not (gatt.subscribed)
 
 
 async def storm(radio, stage, caplog, *, seed, rounds):

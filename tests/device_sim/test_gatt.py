@@ -12,16 +12,18 @@ from device_sim.bracelet import Bracelet, quantise
 from device_sim.gatt import GattBracelet, Start
 from service.errors import ParameterError, WireError
 from service.wearables import bracelet as wire
+from service.wearables import bracelet_control as control
 
 
 async def test_time_goes_on_while_nobody_listens(radio):
     async with LocalAir() as air, air.bracelet(Bracelet(radio.Endless()), speed=20) as gatt, air.central() as central:
-        await radio.until(lambda: gatt.statistics().lost >= 200)
+        await radio.until(lambda: gatt.statistics().measured >= 200)
         host = await radio.Host.connect(central)
         await host.subscribe()
         await host.got(100)
         assert host.blocks[0].index >= 200
         statistics = gatt.statistics()
+        assert (statistics.lost, statistics.waiting >= 200) == (0, True)
         assert statistics.measured == statistics.sent + statistics.lost + statistics.waiting
 
 
@@ -122,6 +124,8 @@ async def test_a_corrupt_packet_is_one_bad_packet(radio):
                 results.append(error.reason)
 
         await host.client.start_notify(wire.DATA, take)
+        await host.client.start_notify(wire.CONTROL, lambda *_: None)
+        await host.client.write_gatt_char(wire.CONTROL, control.start().data, response=True)
         await radio.until(lambda: results)
         gatt.corrupt_next(2)
         await radio.until(lambda: len([result for result in results if isinstance(result, str)]) == 2)

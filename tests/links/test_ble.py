@@ -1,35 +1,18 @@
 """A link is one connection: packets in order, losses told by reason, and no wait without an end."""
 
 import asyncio
-import contextlib
 import time
 
 import pytest
+from links.air import link_to, on_air
 from links.conformance import CHECKS, Bench, take
 
-from device_sim.air import LocalAir
-from device_sim.bracelet import PACKET_SAMPLES, Bracelet
-from device_sim.gait import Walker
+from device_sim.bracelet import PACKET_SAMPLES
 from device_sim.gatt import Start
 from service.errors import LinkError, LinkFault
-from service.links import ble
-from service.links.ble import Backend, BleLink, find
+from service.links.ble import Timeouts, find
 from service.wearables import bracelet as wire
 from service.wearables.contract import Read, Write
-
-
-@contextlib.asynccontextmanager
-async def on_air(seconds=60, **radio):
-    async with LocalAir() as air:
-        bracelet = Bracelet(Walker(f"normal:{seconds}", seed=1))
-        async with air.bracelet(bracelet, **radio) as gatt, air.central() as central:
-            backend = Backend(scanner=central.scanner, client=central.client)
-            (sighting,) = await find(wire.Bracelet.services, for_s=0.3, backend=backend)
-            yield gatt, sighting, backend
-
-
-def link_to(sighting, backend, handshake=None):
-    return BleLink(sighting.handle, handshake or wire.Bracelet().handshake(), backend)
 
 
 def numbered(packets):
@@ -71,9 +54,9 @@ async def test_a_lost_link_says_so():
         assert lost.value.reason is LinkFault.LOST
 
 
-async def test_a_silent_link_is_dropped(monkeypatch):
-    monkeypatch.setattr(ble, "SILENCE_S", 0.2)
-    async with on_air(speed=8) as (gatt, sighting, backend), link_to(sighting, backend) as link:
+async def test_a_silent_link_is_dropped():
+    timeouts = Timeouts(silence_s=0.2)
+    async with on_air(speed=8) as (gatt, sighting, backend), link_to(sighting, backend, timeouts=timeouts) as link:
         await take(link, 12)
         gatt.silence()
         with pytest.raises(LinkError) as silent:
@@ -81,18 +64,16 @@ async def test_a_silent_link_is_dropped(monkeypatch):
         assert silent.value.reason is LinkFault.SILENT
 
 
-async def test_a_device_that_answers_nothing_is_bounded(monkeypatch):
-    monkeypatch.setattr(ble, "CONNECT_TIMEOUT_S", 0.4)
+async def test_a_device_that_answers_nothing_is_bounded():
     async with on_air() as (gatt, sighting, backend):
         await gatt.go_away()
         began = time.monotonic()
         with pytest.raises(LinkError) as failed:
-            async with link_to(sighting, backend):
+            async with link_to(sighting, backend, timeouts=Timeouts(connect_s=0.4)):
                 pass
         assert failed.value.reason in {LinkFault.TIMEOUT, LinkFault.REFUSED}
         assert time.monotonic() - began < 3
         await gatt.come_back()
-        monkeypatch.setattr(ble, "CONNECT_TIMEOUT_S", 5.0)
         async with link_to(sighting, backend) as link:
             assert await take(link, 10)
 

@@ -6,7 +6,6 @@ newest sample was taken.
 
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
-from service.links.ble import Sighting
 from service.pipeline.device import Device
 from service.pipeline.lifecycle import Cause
 from service.pipeline.lineup import lineup
@@ -35,8 +34,14 @@ class Stand:
         self.walker = Walker(schedule, seed=seed, sensors=sensors)
         self.bracelet = Bracelet(self.walker, device_id=device_id, packet_samples=10)
         self.told = []
-        sighting = Sighting(address=f"{device_id}:address", name="Bracelet", rssi_dbm=-50, services=(), handle=None)
-        self.device = Device(sighting, wire.Bracelet(), lineup(counter, **options), self.told.append)
+        self.device = Device(
+            address=f"{device_id}:address",
+            name="Bracelet",
+            rssi_dbm=-50,
+            wearable=wire.Bracelet(),
+            lineup=lineup(counter, **options),
+            publish=self.told.append,
+        )
         self.device.wanted = True
         self._delay_ns = round(delay_s * 1e9)
         self.connect()

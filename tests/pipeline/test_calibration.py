@@ -18,7 +18,8 @@ from service.pipeline.calibration import LONGEST_S, Calibration, Plan, State
 from service.pipeline.lifecycle import State as LinkState
 from service.pipeline.lineup import CounterChoice, lineup
 from service.pipeline.notices import Notice, StateChanged
-from service.samples import Gap, Gridded, Rebooted, SampleBlock, Segmented, Sensor
+from service.samples import Gap, Gridded, Packet, Rebooted, SampleBlock, Segmented, Sensor
+from service.wearables import bracelet as wire
 
 DOUBLE = CounterChoice(name="double_threshold")
 STEPS_20 = Plan(choice=DOUBLE, method="walk", steps=20)
@@ -224,8 +225,8 @@ def test_a_missing_sensor_is_refused_at_once():
 
 def test_a_sensor_that_is_not_sent_fails_with_the_first_samples_and_is_refused_from_then_on():
     stand = Stand("slow:60")
-    tracker = stand.device.session.tracker
-    tracker.info = replace(tracker.info, sensors=tuple(Sensor))
+    sensors = wire.encode_sensors(tuple(Sensor), lsb_per_rad_s=900, lsb_per_100_ut=6400)
+    stand.device.session.apply(Packet(characteristic=wire.SENSORS, data=sensors, at_ns=0))
     begun = stand.device.calibrate(SLOWEST_20)
     stand.walk(1)
     assert begun.state is State.FAILED
@@ -245,8 +246,7 @@ def test_the_slowest_walk_is_learnt_on_a_device_with_a_gyroscope(monkeypatch):
 
 def test_a_device_too_slow_to_count_on_cannot_be_calibrated():
     stand = Stand("normal:60")
-    tracker = stand.device.session.tracker
-    tracker.info = replace(tracker.info, rate_hz=5.0)
+    stand.device.session.apply(Packet(characteristic=wire.RATE, data=wire.encode_rate(5.0), at_ns=0))
     with pytest.raises(CounterError, match="10 samples a second or more; the device takes 5"):
         stand.device.calibrate(STEPS_20)
 

@@ -100,7 +100,7 @@ def test_what_the_device_has_but_does_not_send_is_a_fault_and_the_stream_goes_on
 
 def test_a_counter_goes_on_as_after_a_gap_when_its_sensor_comes_back():
     tracker = beside("turning", sensors=(A, G))
-    made = tracker._counters["turning"]
+    made = tracker._fold._counters["turning"]
     run(tracker, data_packets([10] * 4, sensors=(A, G)))
     assert (tracker.total, tracker.steps_now) == (2, 3)
     events = run(tracker, data_packets([10] * 6, start=40))
@@ -117,7 +117,7 @@ def test_an_overlap_is_cut_from_every_sensor():
     packets = [data_packet(0, sensors=(A, G, M)), data_packet(5, 20, sensors=(A, G, M)), data_packet(20, 5)]
     run(tracker, packets)
     run(plain, data_packets([10, 15], sensors=(A, G, M)))
-    assert tracker._timebase.snapshot() == plain._timebase.snapshot()
+    assert tracker.snapshot()["timebase"] == plain.snapshot()["timebase"]
     assert tracker.steps == plain.steps
 
 

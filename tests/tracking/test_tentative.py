@@ -172,7 +172,6 @@ def test_the_heading_goes_on_from_a_snapshot():
     expected = [event for packet in packets for event in whole.apply(packet)]
     before = [event for packet in packets[:25] for event in first.apply(packet)]
     second.restore(json.loads(json.dumps(first.snapshot())))
-    second.info = first.info
     after = [event for packet in packets[25:] for event in second.apply(packet)]
     assert before + after == expected
     assert any(event.heading for event in after if isinstance(event, Tentative))

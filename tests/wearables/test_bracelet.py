@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from service.errors import WireError, WireFault
 from service.samples import ACCELEROMETER_ONLY, DeviceInfo, Sensor
 from service.wearables import bracelet as wire
+from service.wearables import bracelet_values as values
 
 A, G, M = Sensor
 HELD = [(A,), (A, G), (A, M), (A, G, M)]
@@ -118,7 +119,7 @@ def test_values_outside_the_range_are_sent_as_its_limit():
 
 @given(
     uuid=st.sampled_from(
-        [wire.DATA, wire.SCALE, wire.RATE, wire.BOOT, wire.DEVICE_ID, wire.CLOCK, wire.SENSORS, wire.BATTERY_LEVEL]
+        [action.characteristic for action in wire.Bracelet().handshake()],
     ),
     data=st.binary(max_size=512),
     sensors=st.sampled_from(HELD),
@@ -195,4 +196,42 @@ def test_what_a_device_says_of_itself():
     assert decoder.feed(wire.CLOCK, wire.encode_clock(256, 2**33)) == DeviceInfo(clock=(256, 2**33))
     assert decoder.feed(wire.BATTERY_LEVEL, b"\x57") == DeviceInfo(battery_percent=87)
     assert decoder.feed(wire.MANUFACTURER_NAME, "Größe".encode()) == DeviceInfo(manufacturer="Größe")
+    assert decoder.feed(wire.REGISTER, wire.encode_register(70_000)) == DeviceInfo(register_steps=70_000)
     assert decoder.feed("00002a99-0000-1000-8000-00805f9b34fb", b"x") is None
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_only_a_bracelet_that_keeps_samples_is_asked_for_them(samples):
+    decoder = wire.Bracelet()
+    assert decoder.history(1, 0, 10) == ()
+    assert decoder.feed(wire.HISTORY, wire.encode_history(samples)) == DeviceInfo(history_samples=samples)
+    assert len(decoder.history(1, 0, 10)) == (samples > 0)
+    assert decoder.history(1, 0, 0) == ()
+
+
+def test_the_request_for_samples_in_bytes():
+    decoder = wire.Bracelet()
+    decoder.feed(wire.HISTORY, wire.encode_history(30_000))
+    (write,) = decoder.history(0x01020304, 0xFFFFFFF0, 300)
+    assert (write.characteristic, write.data) == (wire.CONTROL, bytes.fromhex("06 04030201 f0ffffff 2c010000"))
+
+
+def test_a_host_subscribes_to_answers_then_to_data_and_begins_last():
+    *_, control, _battery, _register, data, start = wire.Bracelet().handshake()
+    assert (control.characteristic, data.characteristic) == (wire.CONTROL, wire.DATA)
+    assert (start.characteristic, start.data, start.optional) == (wire.CONTROL, b"\x01", True)
+
+
+@pytest.mark.parametrize("utc_ms", [0, 1, 1_790_000_000_123])
+def test_the_devices_own_utc(utc_ms):
+    assert values.decode_utc(wire.encode_utc(utc_ms)) == (utc_ms or None)
+
+
+@given(st.binary(max_size=512))
+def test_any_bytes_are_a_time_or_a_wire_error(data):
+    try:
+        utc_ms = values.decode_utc(data)
+    except WireError as error:
+        assert error.reason in WireFault
+    else:
+        assert utc_ms is None or 0 < utc_ms < values.LATEST_UTC_MS

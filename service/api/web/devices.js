@@ -39,6 +39,8 @@ export class Devices {
   }
 
   #put(device) {
+    // Known already, and heard under a new address: the card of that address was the same device's.
+    if (device.id !== device.address && this.#entries.has(device.id)) this.#entries.delete(device.address);
     const before = this.#entries.get(device.id) ?? this.#renamed(device);
     if (!before) {
       this.#entries.set(device.id, { device, trace: new Trace() });
