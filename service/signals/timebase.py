@@ -38,6 +38,8 @@ _CORRECTION = 0.5
 """Share of a deviation made good within one stretch."""
 _PACE_LIMIT = 1.25
 """A corrected stretch is at most so much faster or slower than the fitted rate, so that time never runs back."""
+_BREAK_LIMIT = 1.05
+"""Nor is a rate believed that a hole alone says and that is so far from the one before."""
 _SENSORS = ("acc_g", "gyro_rad_s", "mag_ut")
 
 
@@ -126,7 +128,7 @@ class Timebase:
         stretch = block.index // TICK_EVERY
         start = self._start + (stretch - self._stretch) * TICK_EVERY * self._fit.pace
         if block.tick is not None:
-            start = self._fit.anchor(start, _full_tick(block.tick, self._expected_tick(stretch, start)))
+            start = self._fit.anchor(stretch, start, _full_tick(block.tick, self._expected_tick(stretch, start)))
         self._stretch, self._start, self._pace = stretch, start, self._fit.pace
         lane = [0.0] * grid.SIZE
         lane[grid.PLACE] = start + (block.index - stretch * TICK_EVERY) * self._pace
@@ -218,10 +220,18 @@ class _RateFit:
         """How far the device's clock and the grid may differ, grid units; 0 where it has told no tick."""
         return abs(self._error) + _TICK / 2 if self._seen else 0.0
 
-    def anchor(self, start: float, tick: int) -> float:
-        """Return where a stretch begins after a break: `start` if the tick agrees with it, else the tick's place."""
+    def anchor(self, stretch: int, start: float, tick: int) -> float:
+        """Return where a stretch begins after a break: `start` if the tick agrees with it, else the tick's place.
+
+        In the latter case the rate was another too, unless that would be absurd.
+        """
         place = _tick_place(tick)
-        return start if abs(place - start) <= _TICK else place
+        if abs(place - start) <= _TICK:
+            return start
+        pace = self._fitted(stretch, place)
+        if 1 / _BREAK_LIMIT <= pace / self.pace <= _BREAK_LIMIT:
+            self.pace = pace
+        return place
 
     def observe(self, block: RawBlock, start: float, stretch: int) -> int | None:
         """Take the tick of the stretch `block` begins in, once, and return it with its high bits.
@@ -242,12 +252,16 @@ class _RateFit:
         """Return the pace of the stretch that begins at `start`, from ticks of stretches before it."""
         if self._seen is None or abs(self._error) <= _TICK:
             return self.pace
-        (since, origin), (at, place) = self._anchors[0], self._seen
-        if at > since:
-            self.pace = (place - origin) / ((at - since) * TICK_EVERY)
+        at, place = self._seen
+        self.pace = self._fitted(at, place)
         ahead = place + (stretch - at) * TICK_EVERY * self.pace - start
         wanted = self.pace + _CORRECTION * ahead / TICK_EVERY
         return min(max(wanted, self.pace / _PACE_LIMIT), self.pace * _PACE_LIMIT)
+
+    def _fitted(self, at: int, place: float) -> float:
+        """Return the pace from the first anchor to a stretch whose tick says `place`; as it is where there is none."""
+        since, origin = self._anchors[0] if self._anchors else (at, place)
+        return (place - origin) / ((at - since) * TICK_EVERY) if at > since else self.pace
 
 
 def _tick_place(tick: int) -> float:

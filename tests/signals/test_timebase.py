@@ -125,6 +125,75 @@ def test_joining_late_takes_the_high_bits_from_the_clock():
     assert timebase.now_s == pytest.approx((index + 9) / true_hz, abs=0.5)
 
 
+HOUR_S = 3600
+
+
+@pytest.mark.parametrize("away_s", [600, HOUR_S, 24 * HOUR_S])
+@pytest.mark.parametrize("ppm", [-20_000, -200, 0, 200, 20_000])
+@pytest.mark.parametrize("before_s", [6, 60])
+@pytest.mark.parametrize("boot_s", [0, 63.9])
+def test_however_long_it_was_away_the_clock_read_at_reconnecting_tells_the_high_bits(away_s, ppm, before_s, boot_s):
+    """What rate there was time to learn before does not say which of the 64 s a tick belongs to."""
+    true_hz = 50 * (1 + ppm * 1e-6)
+    boot_tick = round(boot_s * 1024)
+    timebase = Timebase(50)
+    timebase.set_clock(0, boot_tick)
+    run(timebase, [10] * (5 * before_s), true_hz, boot_tick=boot_tick)
+    clock = int(50 * (before_s + away_s)) // TICK_EVERY * TICK_EVERY
+    timebase.set_clock(clock, boot_tick + int(1024 * clock / true_hz))
+    for since in (50, 300, 6000):
+        index = clock + since
+        _, gap = timebase.feed(block(index, 10, true_hz, boot_tick=boot_tick))
+        assert abs(timebase.now_s - (boot_s + (index + 9) / true_hz)) < timebase.uncertainty_s
+        assert gap.to_s > gap.from_s
+
+
+def test_an_old_clock_says_nothing_once_ticks_are_nearer():
+    """A rate 1 % off moves the high bits in 53 minutes: counted from the clock read at first they would be wrong."""
+    timebase, true_hz = Timebase(50), 50.5
+    timebase.set_clock(0, 0)
+    index = 0
+    while index < 5 * HOUR_S * 50:
+        timebase.feed(block(index, 10, true_hz))
+        index += 2000
+    assert timebase.now_s == pytest.approx((index - 2000 + 9) / true_hz, abs=0.01)
+
+
+def test_a_clock_read_after_the_index_wrapped_counts_from_there():
+    """The device says u32; the timebase is fed an index that goes on."""
+    true_hz, wrapped = 50.0, (1 << 32) + 5 * TICK_EVERY
+    timebase = Timebase(50)
+    timebase.set_clock((1 << 32) - 300 * TICK_EVERY, int(1024 * ((1 << 32) - 300 * TICK_EVERY) / true_hz))
+    timebase.feed(block((1 << 32) - 300 * TICK_EVERY, 10, true_hz))
+    timebase.set_clock(5 * TICK_EVERY, int(1024 * wrapped / true_hz))
+    timebase.feed(block(wrapped, 10, true_hz))
+    assert timebase.now_s == pytest.approx((wrapped + 9) / true_hz, abs=0.001)
+
+
+@pytest.mark.parametrize("ppm", [-20_000, -200, 200, 20_000])
+def test_device_time_never_stands_or_runs_back(ppm):
+    """Every emitted sample is the next one of the grid, through ten wraps of the tick's low bits."""
+    true_hz, timebase, last = 50 * (1 + ppm * 1e-6), Timebase(50), -1
+    for index in range(0, 32_000, 50):
+        before_s = timebase.now_s
+        samples, gap = timebase.feed(block(index, 50, true_hz, boot_tick=WRAP - 100))
+        assert timebase.now_s > before_s
+        assert gap is None
+        assert last < 0 or samples.start == last + 1
+        last = samples.start + len(samples) - 1
+
+
+def test_the_rate_it_tells_is_that_of_its_ticks_also_after_a_restart():
+    true_hz, timebase = 50.01, Timebase(50)
+    assert timebase.rate is None
+    run(timebase, [50] * 600, true_hz)
+    assert abs(timebase.rate.hz - true_hz) <= timebase.rate.uncertainty_hz < 0.0001
+    assert Timebase.restored(json.loads(json.dumps(timebase.snapshot()))).rate == timebase.rate
+    untold = Timebase(50)
+    run(untold, [50] * 60, true_hz, tick=False)
+    assert untold.rate is None
+
+
 def test_without_ticks_the_nominal_rate_holds():
     grid, _ = run(Timebase(25), [10] * 10, 25, tick=False)
     assert grid[40] == value(20)
