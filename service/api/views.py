@@ -26,6 +26,7 @@ from service.samples import (
     StepCounted,
     Tentative,
 )
+from service.signals.rate import Rate
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SIGNAL_DIGITS = 4
@@ -63,7 +64,7 @@ def device_view(device: Device) -> models.Device:
         cadence_spm=tracker.cadence_spm if device.state is State.STREAMING else None,
         battery_percent=info.battery_percent,
         rate_hz=info.rate_hz,
-        measured_rate_hz=tracker.measured_rate_hz,
+        **_rate_view(tracker.rate),
         rssi_dbm=device.rssi_dbm,
         packets=tally.packets,
         packets_bad=tally.packets_bad,
@@ -79,6 +80,14 @@ def device_view(device: Device) -> models.Device:
         model=info.model,
         firmware=info.firmware,
     )
+
+
+def _rate_view(rate: Rate | None) -> dict[str, Any]:
+    """Return a rate and its uncertainty, without digits that mean nothing."""
+    return {
+        "measured_rate_hz": round(rate.hz, 6) if rate else None,
+        "measured_rate_uncertainty_hz": round(rate.uncertainty_hz, 7) if rate else None,
+    }
 
 
 def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:

@@ -5,7 +5,7 @@
  */
 
 import { CalibrationPanel } from "./calibration_panel.js";
-import { UNKNOWN, duration, localTime, measured, percent, plural, whole } from "./format.js";
+import { UNKNOWN, deviation, duration, localTime, measured, percent, plural, uncertain, whole } from "./format.js";
 import { Lanes, glyph } from "./lanes.js";
 import { look } from "./looks.js";
 import { Plot } from "./plot.js";
@@ -184,13 +184,21 @@ export class Card {
     this.#fields["limit-row"].hidden = !device.samples_saturated;
     this.#text("gaps", whole(device.gaps));
     this.#text("gaps-more", plural(device.reboots, "restart"));
-    this.#text("rate", measured(device.measured_rate_hz ?? device.rate_hz, 1, "Hz"));
-    this.#text("rate-more", device.measured_rate_hz == null ? "nominal" : "measured");
+    this.#rate(device);
     this.#text("rssi", measured(device.rssi_dbm, 0, "dBm"));
     this.#text("rssi-more", strength(device.rssi_dbm));
     const since = device.session_since;
     this.#text("session", since ? localTime(since, now) : UNKNOWN);
     this.#text("session-more", since ? `for ${duration((now - new Date(since)) / 1000)}` : "not begun");
+  }
+
+  /** How fast it samples by its own clock: only digits that are known, and how far that is off what it says. */
+  #rate(device) {
+    const { rate_hz, measured_rate_hz: rate, measured_rate_uncertainty_hz: known } = device;
+    this.#text("rate", known == null ? measured(rate_hz, 1, "Hz") : uncertain(rate, known, "Hz"));
+    const off = known == null || rate_hz == null ? null : deviation(rate, rate_hz, known);
+    const nominal = rate_hz == null ? "" : `nominal ${rate_hz}${off ? `, ${off}` : ""}`;
+    this.#text("rate-more", known == null ? "nominal" : nominal);
   }
 
   #counters(device) {
