@@ -67,6 +67,15 @@ class Device(BaseModel):
         description="The rate by that clock lies no further off: one tick (1/1024 s) in the time it was measured over",
         examples=[0.0008],
     )
+    clock_drift_ppm: float | None = Field(
+        description="How much faster its clock runs than the server's, over up to 68 minutes, negative where slower; of"
+        " a device without a clock, how much faster it samples than it says; null until known to 50 ppm, which takes"
+        " some minutes",
+        examples=[-12.3],
+    )
+    clock_drift_uncertainty_ppm: float | None = Field(
+        description="How far that may be off, 19 times in 20", examples=[2.9]
+    )
     rssi_dbm: int | None = Field(examples=[-58])
     packets: int
     packets_bad: int = Field(description="Packets that broke the format; skipped")

@@ -2,6 +2,7 @@
 
 import re
 
+import pytest
 from browser.conftest import Scripted
 from browser.scripted import AT, counting, device, signal, state, step
 from playwright.sync_api import Locator, Page, expect
@@ -66,12 +67,13 @@ def test_battery_packets_and_losses_are_told(scripted: Scripted) -> None:
     page = scripted(device()).open()
     shown = {name: field(page, name).inner_text().replace("\u00a0", " ") for name in (
         "battery", "packets", "packets-more", "lost", "lost-more", "gaps", "gaps-more", "rate", "rate-more",
-        "rssi", "cadence",
+        "drift", "drift-more", "rssi", "cadence",
     )}  # fmt: skip
     assert shown == {
         "battery": "87 %", "packets": "1,234", "packets-more": "2 bad, 3 repeated", "lost": "1.0 %",
         "lost-more": "100 of 10,000", "gaps": "4", "gaps-more": "1 restart", "rate": "50.0105 ± 0.0009 Hz",
-        "rate-more": "nominal 50, +210 ppm", "rssi": "−58 dBm",
+        "rate-more": "nominal 50, +210 ppm", "drift": "−12 ± 3 ppm",
+        "drift-more": "slower than the server’s", "rssi": "−58 dBm",
         "cadence": "108",
     }  # fmt: skip
 
@@ -98,10 +100,10 @@ def test_tallies_are_kept_up_to_date_by_the_feed(scripted: Scripted) -> None:
 
 
 def test_unknown_values_are_dashes(scripted: Scripted) -> None:
-    page = scripted(device(rate_hz=None, measured_rate_hz=None, measured_rate_uncertainty_hz=None, rssi_dbm=None,
-                           battery_percent=None, cadence_spm=None, samples=0, samples_lost=0,
-                           session_since=None)).open()  # fmt: skip
-    for name in ("rate", "rssi", "cadence", "lost", "session"):
+    page = scripted(device(rate_hz=None, measured_rate_hz=None, measured_rate_uncertainty_hz=None,
+                           clock_drift_ppm=None, clock_drift_uncertainty_ppm=None, rssi_dbm=None, battery_percent=None,
+                           cadence_spm=None, samples=0, samples_lost=0, session_since=None)).open()  # fmt: skip
+    for name in ("rate", "drift", "rssi", "cadence", "lost", "session"):
         expect(field(page, name)).to_have_text("–")
     expect(page.locator(".battery")).to_be_hidden()
 
@@ -121,6 +123,20 @@ def test_a_rate_is_told_as_well_as_it_is_known(scripted: Scripted) -> None:
         server.send({"type": "device", "device": now["id"], "at": now["since"], "value": now})
         expect(field(page, "rate")).to_have_text(rate)
         expect(field(page, "rate-more")).to_have_text(more)
+
+
+@pytest.mark.parametrize(
+    ("ppm", "shown", "more"),
+    [
+        (-12.34, "−12 ± 3\u00a0ppm", "slower"),
+        (2.0, "+2 ± 3\u00a0ppm", "as fast"),
+        (151.0, "+151 ± 3\u00a0ppm", "faster"),
+    ],
+)
+def test_how_the_devices_clock_runs_is_told(scripted: Scripted, ppm: float, shown: str, more: str) -> None:
+    page = scripted(device(clock_drift_ppm=ppm)).open()
+    expect(field(page, "drift")).to_have_text(shown)
+    expect(field(page, "drift-more")).to_contain_text(more)
 
 
 def test_a_lost_bracelet_is_shown_as_lost_since_when_and_comes_back(scripted: Scripted) -> None:

@@ -145,6 +145,18 @@ def test_a_reboot_while_the_host_clock_is_set_labels_each_boot_by_its_own_clock(
         assert first_ns <= notice.at_ns <= last_ns
 
 
+def test_the_drift_is_told_of_the_boot_that_is_running():
+    told = []
+    made = Session(lambda: "d", BackfillTracker(wire.Bracelet(), {"one": MetronomeCounter}, primary="one"), told.append)
+    assert made.drift is None
+    for packet in plain(10):
+        made.apply(replace(packet, at_ns=EPOCH_NS + round((packet.at_ns - EPOCH_NS) / (1 + 150e-6))))
+    assert abs(made.drift.ppm - 150) <= made.drift.uncertainty_ppm < 20
+    for packet in [*described(boot=2), *data_packets([PACKET] * 20, boot=2)]:
+        made.apply(packet)
+    assert made.drift is None
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(("ppm", "sensor_ppm"), [(-200, 200), (200, -200), (-200, -20_000), (200, 20_000)])
 def test_eight_hours_of_clocks_that_drift_leave_every_step_near_the_truth(ppm, sensor_ppm):

@@ -185,6 +185,7 @@ export class Card {
     this.#text("gaps", whole(device.gaps));
     this.#text("gaps-more", plural(device.reboots, "restart"));
     this.#rate(device);
+    this.#drift(device);
     this.#text("rssi", measured(device.rssi_dbm, 0, "dBm"));
     this.#text("rssi-more", strength(device.rssi_dbm));
     const since = device.session_since;
@@ -199,6 +200,12 @@ export class Card {
     const off = known == null || rate_hz == null ? null : deviation(rate, rate_hz, known);
     const nominal = rate_hz == null ? "" : `nominal ${rate_hz}${off ? `, ${off}` : ""}`;
     this.#text("rate-more", known == null ? "nominal" : nominal);
+  }
+
+  /** How fast its clock runs. */
+  #drift({ clock_drift_ppm: ppm, clock_drift_uncertainty_ppm: known }) {
+    this.#text("drift", ppm == null ? UNKNOWN : uncertain(ppm, known, "ppm", true));
+    this.#text("drift-more", ppm == null ? "not known yet" : pace(ppm, known));
   }
 
   #counters(device) {
@@ -237,6 +244,12 @@ export function notice(device, now) {
   if (state === "disconnected") return `Disconnected since ${at}${why}.`;
   const said = reason ? `${STATES[state] ?? state}: ${reason}` : "";
   return [faultNotice(device), said].filter(Boolean).join(" ");
+}
+
+/** Return how a clock runs that drifts by so many ppm, beside the server's. */
+function pace(ppm, known) {
+  if (Math.abs(ppm) <= known) return "as fast as the server’s";
+  return ppm > 0 ? "faster than the server’s" : "slower than the server’s";
 }
 
 function strength(dbm) {
