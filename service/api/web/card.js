@@ -194,18 +194,22 @@ export class Card {
   }
 
   /** How fast it samples by its own clock: only digits that are known, and how far that is off what it says. */
-  #rate(device) {
-    const { rate_hz, measured_rate_hz: rate, measured_rate_uncertainty_hz: known } = device;
-    this.#text("rate", known == null ? measured(rate_hz, 1, "Hz") : uncertain(rate, known, "Hz"));
-    const off = known == null || rate_hz == null ? null : deviation(rate, rate_hz, known);
-    const nominal = rate_hz == null ? "" : `nominal ${rate_hz}${off ? `, ${off}` : ""}`;
-    this.#text("rate-more", known == null ? "nominal" : nominal);
+  #rate({ rate_hz: nominal, measured_rate_hz: rate, measured_rate_uncertainty_hz: known }) {
+    if (rate == null) {
+      this.#text("rate", measured(nominal, 1, "Hz"));
+      this.#text("rate-more", nominal == null ? "" : "nominal");
+      return;
+    }
+    const [value, within] = uncertain(rate, known);
+    const off = nominal == null ? null : deviation(rate, nominal, known);
+    this.#text("rate", `${value}\u00a0Hz`);
+    this.#text("rate-more", [within, nominal != null && `nominal\u00a0${nominal}`, off].filter(Boolean).join(", "));
   }
 
   /** How fast its clock runs. */
   #drift({ clock_drift_ppm: ppm, clock_drift_uncertainty_ppm: known }) {
-    this.#text("drift", ppm == null ? UNKNOWN : uncertain(ppm, known, "ppm", true));
-    this.#text("drift-more", ppm == null ? "not known yet" : pace(ppm, known));
+    this.#text("drift", ppm == null ? UNKNOWN : `${uncertain(ppm, known, true).join(" ")}\u00a0ppm`);
+    this.#text("drift-more", ppm == null ? "not known yet" : "against the server’s");
   }
 
   #counters(device) {
@@ -244,12 +248,6 @@ export function notice(device, now) {
   if (state === "disconnected") return `Disconnected since ${at}${why}.`;
   const said = reason ? `${STATES[state] ?? state}: ${reason}` : "";
   return [faultNotice(device), said].filter(Boolean).join(" ");
-}
-
-/** Return how a clock runs that drifts by so many ppm, beside the server's. */
-function pace(ppm, known) {
-  if (Math.abs(ppm) <= known) return "as fast as the server’s";
-  return ppm > 0 ? "faster than the server’s" : "slower than the server’s";
 }
 
 function strength(dbm) {

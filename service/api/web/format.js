@@ -18,10 +18,10 @@ export function measured(value, digits, unit) {
   return value == null ? UNKNOWN : `${value.toFixed(digits).replace("-", "−")}\u00a0${unit}`;
 }
 
-/** Return "50.0105 ± 0.0009 Hz": `value` with the digits that its uncertainty leaves, `signed` with a plus too. */
-export function uncertain(value, within, unit, signed = false) {
+/** Return ["50.0105", "± 0.0009"]: `value` with the digits that its uncertainty leaves, `signed` with a plus too. */
+export function uncertain(value, within, signed = false) {
   const digits = known(within);
-  return `${decimal(value, digits, signed)} ± ${decimal(Math.ceil(within * 10 ** digits) / 10 ** digits, digits)}\u00a0${unit}`;
+  return [decimal(value, digits, signed), `±\u00a0${decimal(Math.ceil(within * 10 ** digits) / 10 ** digits, digits)}`];
 }
 
 /** Return by how many ppm `value` is off `nominal`, with the digits that `within` leaves; null where it may not be. */
@@ -30,10 +30,9 @@ export function deviation(value, nominal, within) {
   return `${decimal(1e6 * (value / nominal - 1), known((1e6 * within) / nominal), true)}\u00a0ppm`;
 }
 
-/** Return to which decimal an uncertainty is worth telling: one digit of it, two after a leading 1; −1 for tens. */
+/** Return to which decimal what is uncertain by so much is worth telling; −1 for tens. */
 function known(within) {
-  const digits = -Math.floor(Math.log10(within));
-  return within * 10 ** digits < 2 ? digits + 1 : digits;
+  return -Math.floor(Math.log10(within));
 }
 
 function decimal(value, digits, signed = false) {
