@@ -154,7 +154,10 @@ class Journal:
         while True:
             await self._changed.wait()
             await asyncio.sleep(BATCH_S)
-            await self.store(standing(), clock())
+            try:
+                await self.store(standing(), clock())
+            except Exception:  # a fault of ours with one device must not end the others' recording
+                logger.exception("storing what %s told", self.key)
 
     async def close(self, standing: Standing, now_ns: int, *, ended: bool = False) -> None:
         """Store what there is, with a snapshot; what the disk does not take now is lost. `ended` ends the session."""
@@ -194,6 +197,7 @@ class Journal:
                     continue
                 if error.reason is not StoreFault.GONE:
                     logger.error("events and samples of %s are not stored: %s", batch.session.device, error)  # noqa: TRY400
+                    self._snapshot_ns = None  # what is stored next does not go on from it
             if self._unsure is batch:
                 self._unsure = None
 
