@@ -40,6 +40,8 @@ HELD_CHUNKS = 600
 HELD_ENTRIES = 20_000
 """Events that wait for a disk: three hours of walking. Policy: the oldest are not logged; the count has them."""
 RETRY_S = 1.0
+CLOSE_S = 1.5
+"""Longest wait for the disk at the end: the service exits within three seconds."""
 
 logger = logging.getLogger(__name__)
 
@@ -163,10 +165,14 @@ class Journal:
         """Store what there is, with a snapshot; what the disk does not take now is lost. `ended` ends the session."""
         self._closing = True
         self.mark()
-        await self.store(standing, now_ns)
-        if ended and self._store is not None and self.key is not None:
-            self._unsure = Batch(session=self.key, ended_ns=now_ns)
-            await self._send()
+        try:
+            async with asyncio.timeout(CLOSE_S):
+                await self.store(standing, now_ns)
+                if ended and self._store is not None and self.key is not None:
+                    self._unsure = Batch(session=self.key, ended_ns=now_ns)
+                    await self._send()
+        except TimeoutError:
+            logger.error("the disk does not take the last events and samples of %s", self.key)  # noqa: TRY400
 
     def successor(self) -> Journal:
         """Return an empty journal of the same store, for the next session."""
