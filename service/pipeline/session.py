@@ -82,7 +82,7 @@ class Session:
 
     async def follow(self, link: Link) -> None:
         """Take the link's packets until it is lost (LinkError) or the task is cancelled; ask it for what is missing."""
-        asking = asyncio.create_task(self._ask(link), name=f"history of {self._name_device()}")
+        asking = asyncio.create_task(self._ask(link), name="history")
         handled = 0
         try:
             async for packet in link:
