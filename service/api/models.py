@@ -58,7 +58,24 @@ class Device(BaseModel):
     cadence_spm: float | None = Field(description="Steps a minute; null while nobody walks", examples=[108.4])
     battery_percent: int | None = Field(examples=[87])
     rate_hz: float | None = Field(description="Nominal sampling rate", examples=[50.0])
-    measured_rate_hz: float | None = Field(description="Sampling rate by the device's own clock", examples=[50.0])
+    measured_rate_hz: float | None = Field(
+        description="Sampling rate by the device's own clock, of the last ten to twenty minutes; null before it has"
+        " told two ticks since its boot, or without a clock",
+        examples=[50.0105],
+    )
+    measured_rate_uncertainty_hz: float | None = Field(
+        description="The rate by that clock lies no further off: one tick (1/1024 s) in the time it was measured over",
+        examples=[0.0008],
+    )
+    clock_drift_ppm: float | None = Field(
+        description="How much faster its clock runs than the server's, over up to 68 minutes, negative where slower; of"
+        " a device without a clock, how much faster it samples than it says; null until known to 50 ppm, which takes"
+        " some minutes",
+        examples=[-12.3],
+    )
+    clock_drift_uncertainty_ppm: float | None = Field(
+        description="How far that may be off, 19 times in 20", examples=[2.9]
+    )
     rssi_dbm: int | None = Field(examples=[-58])
     packets: int
     packets_bad: int = Field(description="Packets that broke the format; skipped")

@@ -26,6 +26,8 @@ from service.samples import (
     StepCounted,
     Tentative,
 )
+from service.signals.hosttime import Drift
+from service.signals.rate import Rate
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SIGNAL_DIGITS = 4
@@ -63,7 +65,7 @@ def device_view(device: Device) -> models.Device:
         cadence_spm=tracker.cadence_spm if device.state is State.STREAMING else None,
         battery_percent=info.battery_percent,
         rate_hz=info.rate_hz,
-        measured_rate_hz=tracker.measured_rate_hz,
+        **_clocks_view(tracker.rate, session.drift),
         rssi_dbm=device.rssi_dbm,
         packets=tally.packets,
         packets_bad=tally.packets_bad,
@@ -79,6 +81,16 @@ def device_view(device: Device) -> models.Device:
         model=info.model,
         firmware=info.firmware,
     )
+
+
+def _clocks_view(rate: Rate | None, drift: Drift | None) -> dict[str, Any]:
+    """Return rate and drift with their uncertainties, without digits that mean nothing."""
+    return {
+        "measured_rate_hz": round(rate.hz, 6) if rate else None,
+        "measured_rate_uncertainty_hz": round(rate.uncertainty_hz, 7) if rate else None,
+        "clock_drift_ppm": round(drift.ppm, 2) if drift else None,
+        "clock_drift_uncertainty_ppm": round(drift.uncertainty_ppm, 2) if drift else None,
+    }
 
 
 def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:

@@ -19,7 +19,7 @@ from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told, entry_of
 from service.samples import Described, Event, Gap, Gridded, Heard, Packet, Rebooted, Received, StepCounted, Tentative
-from service.signals.hosttime import HostClock
+from service.signals.hosttime import Drift, HostClock
 from service.store.chunker import blocks
 from service.store.values import Chunk, Cursor, Description, Resumable, SessionKey
 from service.tracking.backfill import BackfillTracker
@@ -77,6 +77,11 @@ class Session:
         """Set when something may have to be counted again."""
         self._heard = asyncio.Event()
         """Set at each packet."""
+
+    @property
+    def drift(self) -> Drift | None:
+        """How the device's clock drifts against the host's since its boot; None until that is known."""
+        return self._clock(self.tracker.cursor[0]).drift
 
     # What comes in
 

@@ -186,7 +186,7 @@ class HostClock:
             if within < before_within or abs(slope - before) > within + before_within:
                 self._slope, self._slope_within = slope, within
         heights = ((y - self._slope * x, self._slope_within * (now - x)) for x, y in self._lows.since(now - LEVEL_S))
-        self._height_s, self._height_within_s = min(heights, key=sum)
+        self._height_s, self._height_within_s = min(heights, key=lambda height: height[0] + 2 * height[1])
 
     def _take_spread(self, behind_s: float) -> None:
         behind_s = min(max(behind_s, 0.0), _LATEST_S)

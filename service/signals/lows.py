@@ -56,16 +56,16 @@ class Lows:
     def line(self) -> tuple[float, float] | None:
         """Return the slope of the line below the complete slices and how well it is known (19 in 20); None if too few.
 
-        How well: were the points' mean height above the line, and what the smallest delay wanders, all due to its
-        slope, over the points' span.
+        How well: were twice the height that the nearer half of the points has above the line, and what the smallest
+        delay wanders, all due to its slope, over the points' span.
         """
         lows = self._lows[:-1]
         if len(lows) < LEAST_SLICES:
             return None
         (x0, y0), (x1, y1) = _edge_over(sum(x for x, _ in lows) / len(lows), _lower_hull(lows))
         slope = (y1 - y0) / (x1 - x0)
-        above_s = sum(y - y0 - slope * (x - x0) for x, y in lows) / len(lows)
-        return slope, (above_s + _WANDERS_S) / (lows[-1][0] - lows[0][0])
+        nearer = sorted(y - y0 - slope * (x - x0) for x, y in lows)[: len(lows) // 2]
+        return slope, (2 * sum(nearer) / len(nearer) + _WANDERS_S) / (lows[-1][0] - lows[0][0])
 
     def _make_room(self, slope: float) -> None:
         if self._length_s >= LAST_S:

@@ -24,6 +24,7 @@ from typing import Any, Final
 
 from service.errors import WireError
 from service.samples import Described, DeviceInfo, Event, Heard, Packet, RawBlock, Received, Reply
+from service.signals.rate import Rate
 from service.tracking.awaiting import awaited
 from service.tracking.behind import SLICE_SAMPLES, Behind
 from service.tracking.cutting import cut
@@ -94,8 +95,13 @@ class BackfillTracker:
 
     @property
     def measured_rate_hz(self) -> float | None:
-        """The device's sampling rate as its own clock tells it."""
+        """The rate that samples are placed by: the nominal one until the device's clock disproves it."""
         return self._behind.front.measured_rate_hz
+
+    @property
+    def rate(self) -> Rate | None:
+        """The sampling rate as the device's clock tells it, and how well; None until this boot has told two ticks."""
+        return self._behind.front.rate
 
     @property
     def counter_faults(self) -> dict[str, str]:

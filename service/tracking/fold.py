@@ -31,6 +31,7 @@ from service.samples import (
     Update,
 )
 from service.signals.heading import WalkingDirection
+from service.signals.rate import Rate
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
 from service.tracking.cutting import cut
@@ -92,8 +93,13 @@ class Fold:
 
     @property
     def measured_rate_hz(self) -> float | None:
-        """The device's sampling rate as its own clock tells it."""
+        """The rate that samples are placed by: the nominal one until the device's clock disproves it."""
         return self._timebase.measured_rate_hz if self._timebase else None
+
+    @property
+    def rate(self) -> Rate | None:
+        """The sampling rate as the ticks tell it, and how well; None until this boot has told two."""
+        return self._timebase.rate if self._timebase else None
 
     @property
     def stream(self) -> Stream:

@@ -24,8 +24,8 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def played():
-    """A service that has heard a walk of 30 s to its end."""
-    async with staged(walking(), speed=math.inf, start=Start.ON_SUBSCRIBE) as stage:
+    """A service that has heard a walk of 30 s to its end, of a sensor that is 1000 ppm fast."""
+    async with staged(walking(sensor_ppm=1000), speed=math.inf, start=Start.ON_SUBSCRIBE) as stage:
         await stage.until(lambda device: device["samples"] == 1500)
         yield stage
 
@@ -39,6 +39,12 @@ async def test_a_device_tells_what_it_is_and_what_it_counted(played):
     assert (device["rate_hz"], device["battery_percent"], device["samples_lost"]) == (50.0, 100, 0)
     assert device["manufacturer"] == "steplink"
     assert datetime.fromisoformat(device["since"]).utcoffset() == timedelta(0)
+
+
+async def test_the_rate_by_its_own_clock_is_told_as_well_as_it_is_known(played):
+    device = await played.device()
+    assert device["clock_drift_ppm"] is device["clock_drift_uncertainty_ppm"] is None  # not in so short a time
+    assert abs(device["measured_rate_hz"] - 50.05) <= device["measured_rate_uncertainty_hz"] < 0.003
 
 
 async def test_lists_are_items_and_next(played):

@@ -22,7 +22,9 @@ def device(**changes: Any) -> dict[str, Any]:
         "id": "SL-0001", "name": "Left wrist", "address": "C0:FF:EE:00:00:01", "state": "streaming", "reason": None,
         "since": AT, "session_since": AT, "primary": "double_threshold", "steps": 40, "steps_now": 42,
         "counters": {"double_threshold": 40}, "cadence_spm": 108.4, "battery_percent": 87, "rate_hz": 50.0,
-        "measured_rate_hz": 50.02, "rssi_dbm": -58, "packets": 1234, "packets_bad": 2, "packets_duplicate": 3,
+        "measured_rate_hz": 50.0105, "measured_rate_uncertainty_hz": 0.00083, "clock_drift_ppm": -12.34,
+        "clock_drift_uncertainty_ppm": 2.9, "rssi_dbm": -58,
+        "packets": 1234, "packets_bad": 2, "packets_duplicate": 3,
         "samples": 9900, "samples_lost": 100, "gaps": 4, "reboots": 1, "manufacturer": "Maker", "model": "Bracelet",
         "firmware": "1.0",
     } | changes  # fmt: skip

@@ -18,7 +18,7 @@ const { ticks } = await import("/web/axis.js");
 const { holes } = await import("/web/plot.js");
 const { waitMs } = await import("/web/feed.js");
 const { Poll } = await import("/web/poll.js");
-const { duration, localTime, percent, zone } = await import("/web/format.js");
+const { deviation, duration, localTime, percent, uncertain, zone } = await import("/web/format.js");
 """
 FEED = """
 const trace = new Trace();
@@ -230,3 +230,22 @@ def test_a_known_device_under_a_new_address_is_one_card(run: Run) -> None:
     tell("a", "B");
     return [before, moved, shown()];"""
     assert run(body) == [[["a", "A"], ["B", "B"]], [["a", "B"]], [["a", "B"], ["C", "C"]]]
+
+
+@given(value=st.floats(-1e5, 1e5), within=st.floats(1e-6, 1e3))
+@settings(max_examples=60, deadline=None)
+def test_an_uncertain_number_has_the_digits_that_it_is_known_to(run: Run, value: float, within: float) -> None:
+    shown, known = run("return uncertain(a[0], a[1], true);", [value, within])
+    assert shown[0] in "+−0"
+    assert known[:2] == "±\u00a0"
+    number, bound = (float(text.replace(",", "").replace("−", "-")) for text in (shown, known[2:]))
+    assert within * (1 - 1e-9) <= bound <= 2 * within
+    assert abs(number - value) <= 0.5 * bound + 1e-9 * abs(value)
+    assert len(known[2:].replace(",", "").replace(".", "").strip("0")) == 1
+
+
+def test_a_deviation_is_told_where_it_is_certain(run: Run) -> None:
+    told = run("return a.map(([rate, within]) => deviation(rate, 50, within));", [
+        [50.0105, 0.0008], [50.0105, 0.0106], [49.0, 0.0008], [50.0105, 0.004],
+    ])  # fmt: skip
+    assert told == ["+210\u00a0ppm", None, "−20,000\u00a0ppm", "+210\u00a0ppm"]

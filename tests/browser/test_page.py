@@ -65,11 +65,14 @@ def test_a_step_of_the_primary_counter_raises_the_count_and_another_counters_doe
 def test_battery_packets_and_losses_are_told(scripted: Scripted) -> None:
     page = scripted(device()).open()
     shown = {name: field(page, name).inner_text().replace("\u00a0", " ") for name in (
-        "battery", "packets", "packets-more", "lost", "lost-more", "gaps", "gaps-more", "rate", "rssi", "cadence",
+        "battery", "packets", "packets-more", "lost", "lost-more", "gaps", "gaps-more", "rate", "rate-more",
+        "drift", "drift-more", "rssi", "cadence",
     )}  # fmt: skip
     assert shown == {
         "battery": "87 %", "packets": "1,234", "packets-more": "2 bad, 3 repeated", "lost": "1.0 %",
-        "lost-more": "100 of 10,000", "gaps": "4", "gaps-more": "1 restart", "rate": "50.0 Hz", "rssi": "−58 dBm",
+        "lost-more": "100 of 10,000", "gaps": "4", "gaps-more": "1 restart", "rate": "50.0105 Hz",
+        "rate-more": "± 0.0009, nominal 50, +210 ppm", "drift": "−12 ± 3 ppm",
+        "drift-more": "against the server’s", "rssi": "−58 dBm",
         "cadence": "108",
     }  # fmt: skip
 
@@ -96,11 +99,40 @@ def test_tallies_are_kept_up_to_date_by_the_feed(scripted: Scripted) -> None:
 
 
 def test_unknown_values_are_dashes(scripted: Scripted) -> None:
-    page = scripted(device(rate_hz=None, measured_rate_hz=None, rssi_dbm=None, battery_percent=None, cadence_spm=None,
-                           samples=0, samples_lost=0, session_since=None)).open()  # fmt: skip
-    for name in ("rate", "rssi", "cadence", "lost", "session"):
+    page = scripted(device(rate_hz=None, measured_rate_hz=None, measured_rate_uncertainty_hz=None,
+                           clock_drift_ppm=None, clock_drift_uncertainty_ppm=None, rssi_dbm=None, battery_percent=None,
+                           cadence_spm=None, samples=0, samples_lost=0, session_since=None)).open()  # fmt: skip
+    for name in ("rate", "drift", "rssi", "cadence", "lost", "session"):
         expect(field(page, name)).to_have_text("–")
     expect(page.locator(".battery")).to_be_hidden()
+
+
+def test_a_rate_is_told_as_well_as_it_is_known(scripted: Scripted) -> None:
+    server = scripted(device(measured_rate_hz=None, measured_rate_uncertainty_hz=None))
+    page = server.open()
+    expect(field(page, "rate")).to_have_text("50.0\u00a0Hz")
+    expect(field(page, "rate-more")).to_have_text("nominal")
+    told = [
+        (50.0084, 0.02, "50.01", "± 0.02, nominal 50"),
+        (49.01, 0.0065, "49.010", "± 0.007, nominal 50, −19,800 ppm"),
+        (50.010512, 0.00083, "50.0105", "± 0.0009, nominal 50, +210 ppm"),
+    ]
+    for rate_hz, known_hz, rate, more in told:
+        now = device(measured_rate_hz=rate_hz, measured_rate_uncertainty_hz=known_hz)
+        server.send({"type": "device", "device": now["id"], "at": now["since"], "value": now})
+        expect(field(page, "rate")).to_have_text(f"{rate}\u00a0Hz")
+        expect(field(page, "rate-more")).to_have_text(re.compile(re.escape(more).replace(r"\ ", r"\s")))
+
+
+def test_how_the_devices_clock_runs_is_told(scripted: Scripted) -> None:
+    server = scripted(device(clock_drift_ppm=None, clock_drift_uncertainty_ppm=None))
+    page = server.open()
+    expect(field(page, "drift-more")).to_have_text("not known yet")
+    for ppm, known_ppm, shown in [(-12.34, 2.9, "−12 ± 3"), (151.0, 41.0, "+150 ± 50"), (0.04, 2.0, "0 ± 2")]:
+        now = device(clock_drift_ppm=ppm, clock_drift_uncertainty_ppm=known_ppm)
+        server.send({"type": "device", "device": now["id"], "at": now["since"], "value": now})
+        expect(field(page, "drift")).to_have_text(f"{shown}\u00a0ppm".replace("± ", "±\u00a0"))
+        expect(field(page, "drift-more")).to_have_text("against the server’s")
 
 
 def test_a_lost_bracelet_is_shown_as_lost_since_when_and_comes_back(scripted: Scripted) -> None:

@@ -5,7 +5,7 @@
  */
 
 import { CalibrationPanel } from "./calibration_panel.js";
-import { UNKNOWN, duration, localTime, measured, percent, plural, whole } from "./format.js";
+import { UNKNOWN, deviation, duration, localTime, measured, percent, plural, uncertain, whole } from "./format.js";
 import { Lanes, glyph } from "./lanes.js";
 import { look } from "./looks.js";
 import { Plot } from "./plot.js";
@@ -184,13 +184,32 @@ export class Card {
     this.#fields["limit-row"].hidden = !device.samples_saturated;
     this.#text("gaps", whole(device.gaps));
     this.#text("gaps-more", plural(device.reboots, "restart"));
-    this.#text("rate", measured(device.measured_rate_hz ?? device.rate_hz, 1, "Hz"));
-    this.#text("rate-more", device.measured_rate_hz == null ? "nominal" : "measured");
+    this.#rate(device);
+    this.#drift(device);
     this.#text("rssi", measured(device.rssi_dbm, 0, "dBm"));
     this.#text("rssi-more", strength(device.rssi_dbm));
     const since = device.session_since;
     this.#text("session", since ? localTime(since, now) : UNKNOWN);
     this.#text("session-more", since ? `for ${duration((now - new Date(since)) / 1000)}` : "not begun");
+  }
+
+  /** How fast it samples by its own clock: only digits that are known, and how far that is off what it says. */
+  #rate({ rate_hz: nominal, measured_rate_hz: rate, measured_rate_uncertainty_hz: known }) {
+    if (rate == null) {
+      this.#text("rate", measured(nominal, 1, "Hz"));
+      this.#text("rate-more", nominal == null ? "" : "nominal");
+      return;
+    }
+    const [value, within] = uncertain(rate, known);
+    const off = nominal == null ? null : deviation(rate, nominal, known);
+    this.#text("rate", `${value}\u00a0Hz`);
+    this.#text("rate-more", [within, nominal != null && `nominal\u00a0${nominal}`, off].filter(Boolean).join(", "));
+  }
+
+  /** How fast its clock runs. */
+  #drift({ clock_drift_ppm: ppm, clock_drift_uncertainty_ppm: known }) {
+    this.#text("drift", ppm == null ? UNKNOWN : `${uncertain(ppm, known, true).join(" ")}\u00a0ppm`);
+    this.#text("drift-more", ppm == null ? "not known yet" : "against the server’s");
   }
 
   #counters(device) {

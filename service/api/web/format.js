@@ -18,6 +18,31 @@ export function measured(value, digits, unit) {
   return value == null ? UNKNOWN : `${value.toFixed(digits).replace("-", "−")}\u00a0${unit}`;
 }
 
+/** Return ["50.0105", "± 0.0009"]: `value` with the digits that its uncertainty leaves, `signed` with a plus too. */
+export function uncertain(value, within, signed = false) {
+  const digits = known(within);
+  return [decimal(value, digits, signed), `±\u00a0${decimal(Math.ceil(within * 10 ** digits) / 10 ** digits, digits)}`];
+}
+
+/** Return by how many ppm `value` is off `nominal`, with the digits that `within` leaves; null where it may not be. */
+export function deviation(value, nominal, within) {
+  if (Math.abs(value - nominal) <= within) return null;
+  return `${decimal(1e6 * (value / nominal - 1), known((1e6 * within) / nominal), true)}\u00a0ppm`;
+}
+
+/** Return to which decimal what is uncertain by so much is worth telling; −1 for tens. */
+function known(within) {
+  return -Math.floor(Math.log10(within));
+}
+
+function decimal(value, digits, signed = false) {
+  const tens = 10 ** Math.max(0, -digits);
+  const places = Math.max(0, digits);
+  return (Math.round(value / tens / 10 ** -places) * 10 ** -places * tens).toLocaleString("en", {
+    minimumFractionDigits: places, maximumFractionDigits: places, signDisplay: signed ? "exceptZero" : "negative",
+  }).replace("-", "−");
+}
+
 /** Return `text` with a capital at its head. */
 export function capital(text) {
   return text.slice(0, 1).toUpperCase() + text.slice(1);
