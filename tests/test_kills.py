@@ -96,7 +96,7 @@ def check_kills(parts, kills, seed):
     stored.check_samples(played)
     truth.count(boot, first, stored.cursor.index)
     stored.check_steps(truth)
-    assert not {"gap", "rebooted"} & set(stored.kinds)
+    assert not {"gap", "reboot"} & set(stored.kinds)
     grown = sum(after > before for before, after in zip(recorded, recorded[1:], strict=False))
     assert grown > kills / 4, "it was mostly killed before it stored anything"
     return {"grown": grown, "samples": span.samples, **stored.tallies}

@@ -55,7 +55,9 @@ class Undisturbed:
 
     def _packet(self, index, end):
         counts = self._played.counts(index, end).tolist()
-        data = wire.encode(wire.DataPacket(boot=self._boot, index=index, tick=_tick(wire.tick_index(index)), counts=counts))
+        data = wire.encode(
+            wire.DataPacket(boot=self._boot, index=index, tick=_tick(wire.tick_index(index)), counts=counts)
+        )
         return Packet(characteristic=wire.DATA, data=data, at_ns=0)
 
     def _apply(self, packet):
