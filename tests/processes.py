@@ -53,6 +53,14 @@ class Part:
         self._process.send_signal(signal.SIGINT)
         assert self._process.wait(timeout=10) == 0, self.said()
 
+    def until_said(self, word):
+        """Wait until its log holds `word`."""
+        until_s = time.monotonic() + START_S
+        while word not in self.said():
+            self.check_runs()
+            assert time.monotonic() < until_s, self.said()
+            time.sleep(0.02)
+
     def check_runs(self):
         assert self._process.poll() is None, self.said()
 
@@ -98,3 +106,15 @@ class Parts:
                 return device
             time.sleep(0.05)
         raise AssertionError(f"it did not come about: {self.device()}")
+
+    def goes_on(self, before, parts):
+        """Wait until the session goes on by itself and nothing is missing any more; return the device."""
+        return self.until(
+            lambda device: (
+                device["state"] == "streaming"
+                and device["reboots"] == before["reboots"]
+                and device["samples"] > before["samples"] + 500
+                and device["samples_awaited"] == 0
+            ),
+            parts=parts,
+        )

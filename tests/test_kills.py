@@ -5,6 +5,7 @@ truth is counted here, by the pure Tracker over the very same samples.
 """
 
 import contextlib
+import itertools
 import random
 import time
 
@@ -23,8 +24,18 @@ WALK = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5,normal:45"
 SEED = 7
 SPEED = 8
 """A minute of outage are eight of the device's: the ten it keeps are enough."""
-LIFE_S = 4.0
-"""The service starts, finds the bracelet, asks for what it missed, goes on and stores twice: it is killed in any."""
+START_S, LIFE_S = 1.0, 2.5
+"""A service is killed within the first while it starts, or within the second after it has found the bracelet.
+
+So it is asking for what it missed, going on, or storing: once a second. The outage is never long, on a busy machine
+neither.
+"""
+STARTING = 0.3
+"""Share of those that are killed while they start."""
+
+
+AWAY_S = 1.0
+"""How long each part is away."""
 
 
 class Stored:
@@ -63,8 +74,15 @@ class Stored:
         assert self.tallies == {name: len(steps) for name, steps in truth.steps.items()}
 
 
-def life_s(rng):
-    return rng.uniform(0, LIFE_S)
+def live(parts, service, rng):
+    """Run the service up to the next moment to kill it."""
+    service.start()
+    if rng.random() < STARTING:
+        time.sleep(rng.uniform(0, START_S))
+    else:
+        parts.until(lambda device: device["state"] == "streaming", parts=(service,))
+        time.sleep(rng.uniform(0, LIFE_S))
+    service.check_runs()
 
 
 def check_kills(parts, kills, seed):
@@ -84,10 +102,8 @@ def check_kills(parts, kills, seed):
             truth.count(boot, first, stored.cursor.index)
             stored.check_steps(truth)
             recorded.append(len(stored.raw.values))
-            service.start()
-            time.sleep(life_s(rng))
+            live(parts, service, rng)
             bracelet.check_runs()
-            service.check_runs()
         parts.until(lambda device: device["samples_awaited"] == 0 and device["state"] == "streaming")
         service.end()
     stored = Stored(parts.database)
@@ -97,7 +113,7 @@ def check_kills(parts, kills, seed):
     truth.count(boot, first, stored.cursor.index)
     stored.check_steps(truth)
     assert not {"gap", "reboot"} & set(stored.kinds)
-    grown = sum(after > before for before, after in zip(recorded, recorded[1:], strict=False))
+    grown = sum(after > before for before, after in itertools.pairwise(recorded))
     assert grown > kills / 4, "it was mostly killed before it stored anything"
     return {"grown": grown, "samples": span.samples, **stored.tallies}
 
@@ -114,3 +130,33 @@ def test_the_service_killed_200_times(tmp_path):
     print(f"seed {seed}")
     reached = check_kills(Parts(tmp_path, speed=SPEED, walk=WALK, seed=SEED, beside=COUNTERS[1:]), 200, seed=seed)
     print(f"200 kills in {time.monotonic() - began_s:.0f} s: {reached}")
+
+
+@pytest.mark.full
+def test_air_service_and_bracelet_killed_in_turn(tmp_path):
+    """A bracelet that dies takes what it keeps along: before that all had come, and its new boot begins at sample 0."""
+    parts = Parts(tmp_path, speed=SPEED, walk=WALK, seed=SEED, beside=COUNTERS[1:])
+    with contextlib.ExitStack() as stack:
+        air = stack.enter_context(parts.air_alone())
+        air.until_said("open")  # else the bracelet serves the air
+        bracelet, service = (stack.enter_context(part) for part in (parts.bracelet(), parts.service()))
+        everybody = (air, bracelet, service)
+        device = parts.goes_on({"samples": 0, "reboots": 0}, everybody)
+        for killed in (air, service, bracelet, service):
+            killed.kill()
+            if killed is not service:
+                parts.until(lambda device: device["state"] != "streaming")
+            time.sleep(AWAY_S)
+            killed.start()
+            device = parts.goes_on({**device, "reboots": device["reboots"] + (killed is bracelet)}, everybody)
+        service.end()
+    stored, played = Stored(parts.database), Played(WALK, SEED)
+    stored.check_samples(played)
+    before, after = stored.raw.spans
+    assert (after.index, after.index + after.samples) == (0, stored.cursor.index)
+    truth = Undisturbed(played, COUNTERS)
+    truth.count(before.boot, before.index, before.index + before.samples)
+    truth.count(after.boot, after.index, stored.cursor.index)
+    stored.check_steps(truth)
+    assert (stored.kinds.count("reboot"), stored.kinds.count("gap"), truth.reboots) == (1, 0, 1)
+    assert stored.kinds.count("correction") >= 2, "something was missing in each run, and came"
