@@ -18,6 +18,7 @@ from typing import Any, Protocol
 from service.errors import StoreError, StoreFault
 from service.samples import DeviceInfo, Heard, Received
 from service.store.chunker import Chunker
+from service.store.joined import joined
 from service.store.values import (
     Batch,
     Chunk,
@@ -35,11 +36,15 @@ BATCH_S = 1.0
 """How long events and samples are gathered before they are stored: what a crash costs at most is asked for again."""
 SNAPSHOT_NS = 30_000_000_000
 """A restart counts at most so much again."""
+GATHERED_BLOCKS = 64
+"""Packets whose samples wait to be put into chunks together: ten seconds of a live device."""
 HELD_CHUNKS = 600
 """Seconds of samples that wait for a disk: ten minutes, which the device itself keeps too."""
 HELD_ENTRIES = 20_000
 """Events that wait for a disk: three hours of walking. Policy: the oldest are not logged; the count has them."""
 RETRY_S = 1.0
+CLOSE_S = 1.5
+"""Longest wait for the disk at the end: the service exits within three seconds."""
 
 logger = logging.getLogger(__name__)
 
@@ -75,6 +80,9 @@ class Journal:
         """On its way to the disk, or there without our knowing."""
         self._closing = False
         self._chunker = Chunker()
+        self._blocks: list[tuple[Received, int]] = []
+        """New samples and when they arrived, not in a chunk yet; `_layout_of` tells their layout."""
+        self._layout_of = DeviceInfo()
         self._chunks: list[Chunk] = []
         self._descriptions: list[Description] = []
         self._about: Mapping[str, Any] | None = None
@@ -93,16 +101,12 @@ class Journal:
         """Take samples that are new, of a device that described itself by `info`."""
         if self._store is None or self._over or info.rate_hz is None or info.lsb_per_g is None:
             return
-        layout = Layout(
-            rate_hz=info.rate_hz,
-            lsb_per_g=info.lsb_per_g,
-            lsb_per_rad_s=info.lsb_per_rad_s,
-            lsb_per_ut=info.lsb_per_ut,
-        )
-        self._chunks += self._chunker.add(told.block, run=told.run, layout=layout, at_ns=at_ns)
-        if len(self._chunks) > HELD_CHUNKS:
-            del self._chunks[: len(self._chunks) - HELD_CHUNKS]
-            self._snapshot_ns = None
+        if self._blocks and self._layout_of is not info and self._layout_of != info:
+            self._gather()
+        self._layout_of = info
+        self._blocks.append((told, at_ns))
+        if len(self._blocks) >= GATHERED_BLOCKS:
+            self._gather()
         self._changed.set()
 
     def heard(self, told: Heard, at_ns: int) -> None:
@@ -154,16 +158,23 @@ class Journal:
         while True:
             await self._changed.wait()
             await asyncio.sleep(BATCH_S)
-            await self.store(standing(), clock())
+            try:
+                await self.store(standing(), clock())
+            except Exception:  # a fault of ours with one device must not end the others' recording
+                logger.exception("storing what %s told", self.key)
 
     async def close(self, standing: Standing, now_ns: int, *, ended: bool = False) -> None:
         """Store what there is, with a snapshot; what the disk does not take now is lost. `ended` ends the session."""
         self._closing = True
         self.mark()
-        await self.store(standing, now_ns)
-        if ended and self._store is not None and self.key is not None:
-            self._unsure = Batch(session=self.key, ended_ns=now_ns)
-            await self._send()
+        try:
+            async with asyncio.timeout(CLOSE_S):
+                await self.store(standing, now_ns)
+                if ended and self._store is not None and self.key is not None:
+                    self._unsure = Batch(session=self.key, ended_ns=now_ns)
+                    await self._send()
+        except TimeoutError:
+            logger.error("the disk does not take the last events and samples of %s", self.key)  # noqa: TRY400
 
     def successor(self) -> Journal:
         """Return an empty journal of the same store, for the next session."""
@@ -173,7 +184,7 @@ class Journal:
         """Forget all that waits and store nothing more: the session's data are deleted."""
         self._over, self._store = True, None
         self._entries.clear()
-        self._chunks, self._descriptions, self._unsure = [], [], None
+        self._chunks, self._descriptions, self._blocks, self._unsure = [], [], [], None
 
     async def store(self, standing: Standing, now_ns: int) -> None:
         """Store what there is now; while the disk does not take it, wait and try again."""
@@ -194,11 +205,31 @@ class Journal:
                     continue
                 if error.reason is not StoreFault.GONE:
                     logger.error("events and samples of %s are not stored: %s", batch.session.device, error)  # noqa: TRY400
+                    self._snapshot_ns = None  # what is stored next does not go on from it
             if self._unsure is batch:
                 self._unsure = None
 
+    def _gather(self) -> None:
+        """Put the samples that wait into chunks: together, since that costs a tenth of one packet at a time."""
+        info = self._layout_of
+        blocks, self._blocks = self._blocks, []
+        if info.rate_hz is None or info.lsb_per_g is None:
+            return
+        layout = Layout(
+            rate_hz=info.rate_hz,
+            lsb_per_g=info.lsb_per_g,
+            lsb_per_rad_s=info.lsb_per_rad_s,
+            lsb_per_ut=info.lsb_per_ut,
+        )
+        for told, at_ns in joined(blocks):
+            self._chunks += self._chunker.add(told.block, run=told.run, layout=layout, at_ns=at_ns)
+        if len(self._chunks) > HELD_CHUNKS:
+            del self._chunks[: len(self._chunks) - HELD_CHUNKS]
+            self._snapshot_ns = None
+
     def _take(self, key: SessionKey, standing: Standing, now_ns: int) -> Batch:
         """Return all that waits as one batch, of this very moment."""
+        self._gather()
         cursor = standing.cursor
         snapshot = None
         due = self._snapshot_ns is None or not 0 <= now_ns - self._snapshot_ns < SNAPSHOT_NS

@@ -253,8 +253,12 @@ class Session:
             self._behind.clear()
             while self.tracker.has_work:
                 until_s = time.perf_counter() + SLICE_S
-                while time.perf_counter() < until_s and self.tracker.has_work:
-                    self.catch_up()
+                try:
+                    while time.perf_counter() < until_s and self.tracker.has_work:
+                        self.catch_up()
+                except Exception:  # a fault of ours with one device must end neither its recording nor the others
+                    logger.exception("counting again for %s", self._name_device())
+                    break
                 await asyncio.sleep(0)
 
     def catch_up(self) -> None:

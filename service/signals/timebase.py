@@ -124,11 +124,18 @@ class Timebase:
         return made
 
     def _begin(self, block: RawBlock) -> None:
-        """Start the grid afresh at `block`: where its own tick says, or where the rate does if the two agree."""
+        """Start the grid afresh at `block`: where its own tick says, or where the rate does if the two agree.
+
+        The grid never goes back: a tick that would have it do so is not believed.
+        """
         stretch = block.index // TICK_EVERY
-        start = self._start + (stretch - self._stretch) * TICK_EVERY * self._fit.pace
+        told = self._start + (stretch - self._stretch) * TICK_EVERY * self._fit.pace
+        emitted = self._lanes["acc_g"][grid.NEXT] if self._lanes else 0.0
+        start = told
         if block.tick is not None:
-            start = self._fit.anchor(stretch, start, _full_tick(block.tick, self._expected_tick(stretch, start)))
+            start = self._fit.anchor(stretch, told, _full_tick(block.tick, self._expected_tick(stretch, told)))
+        if start + (block.index - stretch * TICK_EVERY) * self._fit.pace < emitted:
+            start = told
         self._stretch, self._start, self._pace = stretch, start, self._fit.pace
         lane = [0.0] * grid.SIZE
         lane[grid.PLACE] = start + (block.index - stretch * TICK_EVERY) * self._pace
@@ -261,7 +268,9 @@ class _RateFit:
     def _fitted(self, at: int, place: float) -> float:
         """Return the pace from the first anchor to a stretch whose tick says `place`; as it is where there is none."""
         since, origin = self._anchors[0] if self._anchors else (at, place)
-        return (place - origin) / ((at - since) * TICK_EVERY) if at > since else self.pace
+        if at <= since or place <= origin:  # a clock that stands still tells no rate
+            return self.pace
+        return (place - origin) / ((at - since) * TICK_EVERY)
 
 
 def _tick_place(tick: int) -> float:

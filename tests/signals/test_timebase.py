@@ -194,6 +194,29 @@ def test_the_rate_it_tells_is_that_of_its_ticks_also_after_a_restart():
     assert untold.rate is None
 
 
+def ticked(index, tick, n=10):
+    flat = [1.0] * n
+    return RawBlock(boot=1, index=index, tick=tick & 0xFFFF, acc_g=(flat, flat, flat))
+
+
+def test_a_clock_that_stands_still_tells_no_rate():
+    timebase = Timebase(50.0)
+    for index in range(0, 20_000, 10):
+        timebase.feed(ticked(index, 7))
+    assert 40 < timebase.measured_rate_hz < 63
+    assert timebase.now_s > 0
+
+
+@pytest.mark.parametrize("wrong", [-9000, -3000, 3000])
+def test_a_wrong_tick_after_a_long_hole_does_not_set_the_grid_back(wrong):
+    timebase, emitted = Timebase(50.0), 0
+    for index in [*range(0, 2000, 10), *range(2040, 4000, 10)]:
+        tick = int(index // TICK_EVERY * TICK_EVERY * 1024 / 50) + (wrong if index >= 2040 else 0)
+        samples, _ = timebase.feed(ticked(index, tick))
+        assert samples.start >= emitted
+        emitted = samples.start + len(samples)
+
+
 def test_without_ticks_the_nominal_rate_holds():
     grid, _ = run(Timebase(25), [10] * 10, 25, tick=False)
     assert grid[40] == value(20)

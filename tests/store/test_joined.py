@@ -1,0 +1,65 @@
+"""Joined packets are stored as the packets themselves are."""
+
+import dataclasses
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.samples import TICK_EVERY, RawBlock, Received
+from service.store.chunker import Chunker
+from service.store.joined import joined
+from service.store.values import Layout
+
+LAYOUT = Layout(rate_hz=50.0, lsb_per_g=4096.0, lsb_per_rad_s=900.0)
+
+
+def column(index, n, factor):
+    return [factor * ((index + i) % 1000) / 4096 for i in range(n)]
+
+
+def block(index, n, boot, *, gyro, tick):
+    acc = tuple(column(index, n, factor) for factor in (1, 2, 3))
+    turns = tuple([float((index + i) % 30) / 900 for i in range(n)] for _ in range(3))
+    stretch = index // TICK_EVERY
+    return RawBlock(
+        boot=boot,
+        index=index,
+        tick=stretch * 37 % 65536 if tick else None,
+        acc_g=acc,
+        gyro_rad_s=turns if gyro else None,
+        saturated=[n - 1] if n > 3 else [],
+    )
+
+
+PACKETS = st.lists(
+    st.tuples(
+        st.integers(1, 40), st.sampled_from([0, 0, 0, 0, 7, 300]), st.booleans(), st.sampled_from([True] * 9 + [False])
+    ),
+    max_size=60,
+)
+
+
+@given(packets=PACKETS, reboot_at=st.integers(0, 80))
+def test_the_same_chunks_come_of_it(packets, reboot_at):
+    arrived, index, run = [], 5, 0
+    for k, (n, hole, gyro, tick) in enumerate(packets):
+        if k == reboot_at:
+            run, index = 1, 0
+        index += hole
+        arrived.append((Received(run=run, block=block(index, n, 1 + run, gyro=gyro and k > 30, tick=tick)), k))
+        index += n
+    assert [chunks(arrived)] == [chunks(list(joined(arrived)))]
+
+
+def chunks(arrived):
+    chunker, made = Chunker(), []
+    for told, at_ns in arrived:
+        made += chunker.add(told.block, run=told.run, layout=LAYOUT, at_ns=at_ns)
+    return [dataclasses.replace(chunk, at_ns=0) for chunk in made + chunker.flush()]
+
+
+def test_what_goes_on_is_one_block_up_to_the_next_tick_and_keeps_what_is_saturated():
+    arrived = [(Received(run=0, block=block(10 * k, 10, 1, gyro=True, tick=True)), k) for k in range(20)]
+    made = list(joined(arrived))
+    assert [(told.block.index, len(told.block)) for told, _ in made] == [(0, 130), (130, 70)]
+    assert made[0][0].block.saturated == list(range(9, 130, 10))
