@@ -27,13 +27,11 @@ SPEED = 8
 START_S, LIFE_S = 1.0, 2.0
 """A service is killed within the first while it starts, or within the second after it has found the bracelet.
 
-So it is asking for what it missed, going on, or storing: once a second. The outage is never long, on a busy machine
-neither.
+So it is asking for what it missed, going on, or storing, which it does once a second. No outage is long, not even on a
+busy machine.
 """
 STARTING = 0.3
 """Share of those that are killed while they start."""
-
-
 AWAY_S = 1.0
 """How long each part is away."""
 
