@@ -18,9 +18,22 @@ from service.pipeline.journal import Journal, Standing
 from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told, entry_of
-from service.samples import Described, Event, Gap, Gridded, Heard, Packet, Rebooted, Received, StepCounted, Tentative
+from service.samples import (
+    Described,
+    Event,
+    Gap,
+    Gridded,
+    Heard,
+    Packet,
+    RawBlock,
+    Rebooted,
+    Received,
+    StepCounted,
+    Tentative,
+)
 from service.signals.hosttime import Drift, HostClock
 from service.store.chunker import blocks
+from service.store.codec import parted
 from service.store.values import Chunk, Cursor, Description, Resumable, SessionKey
 from service.tracking.backfill import BackfillTracker
 from service.wearables.contract import Write
@@ -87,7 +100,7 @@ class Session:
 
     async def follow(self, link: Link) -> None:
         """Take the link's packets until it is lost (LinkError) or the task is cancelled; ask it for what is missing."""
-        asking = asyncio.create_task(self._ask(link), name=f"history of {self._name_device()}")
+        asking = asyncio.create_task(self._ask(link), name="history")
         handled = 0
         try:
             async for packet in link:
@@ -140,14 +153,29 @@ class Session:
                 self._clock(int(run)).restore(state)
 
     def replay(self, item: Chunk | Description, counted: Cursor | None) -> None:
-        """Count again what was stored; up to `counted` it was told before, and what is missing there is lost."""
+        """Count again what was stored.
+
+        Up to `counted` it was told before, and what is missing there is lost. What is behind is told now: samples may
+        have been stored that waited to be counted.
+        """
         if isinstance(item, Description):
             self.tracker.replay_heard(item.characteristic, item.value)
             return
-        for block in blocks(item):
-            self.tracker.replay_block(item.run, block, counted.place if counted else (0, 0))
-            while self.tracker.has_work:
-                self.tracker.catch_up()
+        place = counted.place if counted else (0, 0)
+        self._arrived_ns = item.at_ns
+        for piece in parted(item, place[1]) if item.run == place[0] else (item,):
+            for block in blocks(piece):
+                self._replay_block(item, block, place)
+
+    def _replay_block(self, item: Chunk, block: RawBlock, counted: tuple[int, int]) -> None:
+        run = self.tracker.cursor[0]
+        events = self.tracker.replay_block(item.run, block, counted)
+        if item.run not in self._clocks:
+            self._clock(item.run).arrived(self.tracker.now_s, item.at_ns)
+        if (item.run, block.index) >= counted:
+            self._tell_all(_without_beginning(events) if item.run == counted[0] else events, run, item.at_ns)
+        while self.tracker.has_work:
+            self.catch_up()
 
     # What goes out
 
@@ -296,3 +324,9 @@ class Session:
                 return self._clock(run).at_ns(event.to_s)
             case _:
                 return self._clock(run).at_ns(self.tracker.now_s)
+
+
+def _without_beginning(events: list[Event]) -> list[Event]:
+    """Return what followed the beginning of a run, if they tell of it: it was told before."""
+    begun = [place for place, event in enumerate(events) if isinstance(event, Rebooted)]
+    return events[begun[-1] + 1 :] if begun else events

@@ -104,6 +104,13 @@ def cut(chunk: Chunk, first: int, end: int) -> Chunk:
     )
 
 
+def parted(chunk: Chunk, place: int) -> Sequence[Chunk]:
+    """Return a chunk in two where it holds samples before and after `place`."""
+    if not chunk.index < place < chunk.end:
+        return (chunk,)
+    return cut(chunk, chunk.index, place), cut(chunk, place, chunk.end)
+
+
 def columns(chunk: Chunk) -> tuple[bytes | None, bytes | None, bytes | None]:
     """Return a chunk's sensors in the order of their numbers in the database."""
     return chunk.acc, chunk.gyro, chunk.mag
