@@ -45,8 +45,8 @@ class RateSpan:
 
     def observe(self, stretch: int, tick: int) -> None:
         """Take the full tick at the first sample of a stretch later than those before."""
-        if self.newest is not None and tick - self.newest[1] >= SPAN_S * TICK_HZ:
-            self.anchors = []  # the device was away for so long that its rate may have changed
+        if self.newest is not None and not 0 < tick - self.newest[1] < SPAN_S * TICK_HZ:
+            self.anchors = []  # away for so long that its rate may have changed, or a clock that does not run
         self.newest = (stretch, tick)
         if not self.anchors or tick - self.anchors[-1][1] >= SPAN_S * TICK_HZ:
             self.anchors = [*self.anchors[-1:], self.newest]

@@ -52,6 +52,16 @@ def test_after_a_long_outage_the_rate_is_measured_anew():
     assert span.rate.hz == pytest.approx(51, abs=span.rate.uncertainty_hz)
 
 
+@pytest.mark.parametrize("per_stretch", [0, -100])
+def test_a_clock_that_stands_still_or_runs_back_tells_no_rate(per_stretch):
+    span = told(50, 300)
+    for stretch in range(200, 300):
+        span.observe(stretch, 307_200 + per_stretch * stretch)
+        assert span.rate is None or stretch == 200
+    told(50, 60, since=300, begun=100.0, span=span)
+    assert span.rate.hz == pytest.approx(50, abs=span.rate.uncertainty_hz)
+
+
 def test_a_short_outage_is_spanned():
     span = told(50, 300)
     before = span.rate.uncertainty_hz
