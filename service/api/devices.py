@@ -45,7 +45,7 @@ def add_device_routes(app: FastAPI, supervisor: Supervisor) -> None:
 
     @app.get("/api/v1/devices", tags=["devices"])
     async def list_devices() -> models.Page[models.Device]:
-        """List every device heard since the start."""
+        """List every device with a stored session and every one heard since the start."""
         return models.Page(items=[device_view(device) for device in supervisor.devices])
 
     @app.get("/api/v1/devices/{id}", tags=["devices"], responses=_UNKNOWN)

@@ -89,6 +89,13 @@ class Device(BaseModel):
     samples_saturated: int = Field(description="Samples with a value at its limit, counted: the true one is unknown")
     gaps: int
     reboots: int
+    register_steps: int | None = Field(
+        description="The device's own count since its boot, where it has one: to compare with, never part of `steps`",
+        examples=[125],
+    )
+    history_s: float | None = Field(
+        description="How many seconds of samples it can send again; 0 none, null unknown", examples=[600.0]
+    )
     manufacturer: str | None
     model: str | None
     firmware: str | None

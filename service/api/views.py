@@ -19,6 +19,7 @@ from service.samples import (
     Band,
     Corrected,
     Counting,
+    DeviceInfo,
     Gap,
     Rebooted,
     Segmented,
@@ -77,6 +78,8 @@ def device_view(device: Device) -> models.Device:
         samples_saturated=tally.samples_saturated,
         gaps=tally.gaps,
         reboots=tally.reboots,
+        register_steps=info.register_steps,
+        history_s=_history_s(info),
         manufacturer=info.manufacturer,
         model=info.model,
         firmware=info.firmware,
@@ -91,6 +94,12 @@ def _clocks_view(rate: Rate | None, drift: Drift | None) -> dict[str, Any]:
         "clock_drift_ppm": round(drift.ppm, 2) if drift else None,
         "clock_drift_uncertainty_ppm": round(drift.uncertainty_ppm, 2) if drift else None,
     }
+
+
+def _history_s(info: DeviceInfo) -> float | None:
+    if info.history_samples is None or info.rate_hz is None:
+        return None
+    return round(info.history_samples / info.rate_hz, 1)
 
 
 def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:

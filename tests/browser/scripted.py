@@ -24,7 +24,8 @@ def device(**changes: Any) -> dict[str, Any]:
         "counters": {"double_threshold": 40}, "cadence_spm": 108.4, "battery_percent": 87, "rate_hz": 50.0,
         "measured_rate_hz": 50.0105, "measured_rate_uncertainty_hz": 0.00083, "clock_drift_ppm": -12.34,
         "clock_drift_uncertainty_ppm": 2.9, "rssi_dbm": -58,
-        "packets": 1234, "packets_bad": 2, "packets_duplicate": 3,
+        "packets": 1234, "packets_bad": 2, "packets_duplicate": 3, "packets_reordered": 1,
+        "samples_awaited": 0, "register_steps": None,
         "samples": 9900, "samples_lost": 100, "gaps": 4, "reboots": 1, "manufacturer": "Maker", "model": "Bracelet",
         "firmware": "1.0",
     } | changes  # fmt: skip

@@ -69,7 +69,7 @@ def test_battery_packets_and_losses_are_told(scripted: Scripted) -> None:
         "drift", "drift-more", "rssi", "cadence",
     )}  # fmt: skip
     assert shown == {
-        "battery": "87 %", "packets": "1,234", "packets-more": "2 bad, 3 repeated", "lost": "1.0 %",
+        "battery": "87 %", "packets": "1,234", "packets-more": "2 bad, 3 repeated, 1 late", "lost": "1.0 %",
         "lost-more": "100 of 10,000", "gaps": "4", "gaps-more": "1 restart", "rate": "50.0105 Hz",
         "rate-more": "± 0.0009, nominal 50, +210 ppm", "drift": "−12 ± 3 ppm",
         "drift-more": "against the server’s", "rssi": "−58 dBm",
@@ -216,3 +216,33 @@ def test_a_reboot_forgets_the_signal_and_keeps_the_count(scripted: Scripted) -> 
     server.send(signal(0, 2), counting(44, 44))
     expect(field(page, "steps-now")).to_have_text("44")
     expect(field(page, "gaps-more")).to_have_text("2 restarts")
+
+
+def test_what_is_awaited_is_told_and_what_the_bracelet_counts_itself(scripted: Scripted) -> None:
+    server = scripted(device(samples_awaited=4000, register_steps=1250))
+    page = server.open()
+    card = page.locator(".card")
+    expect(card.locator(".notice").first).to_have_text(
+        "Asking for 1\u00a0min that were missed. Until they are here, later steps are pending."
+    )
+    expect(card.locator("[data-f=lost-more]")).to_have_text("100 of 10,000, 4,000 awaited")
+    expect(card.locator("[data-f=own]")).to_have_text("1,250")
+    server.send({"type": "device", "device": "SL-0001", "at": AT, "value": device()})
+    expect(card.locator(".notice").first).to_be_hidden()
+    expect(card.locator("[data-f=own-row]")).to_be_hidden()
+    server.send({"type": "awaited", "device": "SL-0001", "at": AT, "from_s": 1.0, "to_s": 2.0, "samples": 50})
+    correction = {"type": "correction", "device": "SL-0001", "at": AT, "ordinal": 7, "boot": 1, "from_s": 1.0}
+    server.send(correction | {"to_s": 2.0, "removed": 0, "added": 2})
+    assert server.errors == []
+
+
+def test_a_disk_that_takes_nothing_is_told(scripted: Scripted) -> None:
+    server = scripted(device())
+    server.health = {"reason": None, "store_reason": "the disk of s.db is full: free some room"}
+    page = server.open()
+    trouble = page.locator("#store-trouble")
+    expect(trouble).to_have_text(
+        "Steps are counted but not stored for now: the disk of s.db is full: free some room", timeout=10_000
+    )
+    server.health = {"reason": None, "store_reason": None}
+    expect(trouble).to_be_hidden(timeout=10_000)

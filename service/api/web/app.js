@@ -104,12 +104,15 @@ function showDevices() {
   document.title = entries.length === 1 ? `${counts(entries[0].device).now} steps · steplink` : "steplink";
 }
 
-/** While there is no bracelet, say whether the server's Bluetooth is the reason. */
+/** Say what does not work on the server: its store, and, while there is no bracelet, its Bluetooth. */
 async function showTrouble() {
-  if ($("empty").hidden || server.state !== "open") return;
+  if (server.state !== "open") return;
   const { value: health } = await request("healthz", { timeoutMs: ANSWER_MS });
   $("trouble").hidden = !health?.reason;
   setText("trouble", health?.reason ? `Bluetooth does not work on the server: ${health.reason}` : "");
+  $("store-trouble").hidden = !health?.store_reason;
+  const now = "Steps are counted but not stored for now";
+  setText("store-trouble", health?.store_reason ? `${now}: ${health.store_reason}` : "");
 }
 
 function announce(nowMs) {

@@ -24,6 +24,8 @@ const STATES = {
 /** States in which the server holds the device or tries to; the button then offers to let it go. */
 const HELD = new Set(["connecting", "streaming", "lost"]);
 const LOW_BATTERY_PERCENT = 20;
+/** What is fetched within a moment is not worth a sentence. */
+const AWAITED_S = 2;
 const LEVEL_WIDTH = 17;
 
 export class Card {
@@ -177,9 +179,11 @@ export class Card {
 
   #facts(device, now) {
     this.#text("packets", whole(device.packets));
-    this.#text("packets-more", `${whole(device.packets_bad)} bad, ${whole(device.packets_duplicate)} repeated`);
+    const odd = [[device.packets_bad, "bad"], [device.packets_duplicate, "repeated"], [device.packets_reordered, "late"]];
+    this.#text("packets-more", odd.map(([count, word]) => `${whole(count ?? 0)} ${word}`).join(", "));
     this.#text("lost", percent(device.samples_lost, device.samples));
-    this.#text("lost-more", `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`);
+    const lost = `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`;
+    this.#text("lost-more", device.samples_awaited ? `${lost}, ${whole(device.samples_awaited)} awaited` : lost);
     this.#text("limit", whole(device.samples_saturated));
     this.#fields["limit-row"].hidden = !device.samples_saturated;
     this.#text("gaps", whole(device.gaps));
@@ -188,6 +192,8 @@ export class Card {
     this.#drift(device);
     this.#text("rssi", measured(device.rssi_dbm, 0, "dBm"));
     this.#text("rssi-more", strength(device.rssi_dbm));
+    this.#text("own", whole(device.register_steps));
+    this.#fields["own-row"].hidden = device.register_steps == null;
     const since = device.session_since;
     this.#text("session", since ? localTime(since, now) : UNKNOWN);
     this.#text("session-more", since ? `for ${duration((now - new Date(since)) / 1000)}` : "not begun");
@@ -247,7 +253,14 @@ export function notice(device, now) {
   }
   if (state === "disconnected") return `Disconnected since ${at}${why}.`;
   const said = reason ? `${STATES[state] ?? state}: ${reason}` : "";
-  return [faultNotice(device), said].filter(Boolean).join(" ");
+  return [faultNotice(device), said, state === "streaming" ? awaitedNotice(device) : ""].filter(Boolean).join(" ");
+}
+
+/** Say that something missed is being fetched, where it is more than a moment. */
+function awaitedNotice({ samples_awaited: samples, measured_rate_hz: measuredHz, rate_hz: nominalHz }) {
+  const seconds = (samples ?? 0) / (measuredHz ?? nominalHz ?? 50);
+  if (seconds < AWAITED_S) return "";
+  return `Asking for ${duration(seconds)} that were missed. Until they are here, later steps are pending.`;
 }
 
 function strength(dbm) {
