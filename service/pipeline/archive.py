@@ -8,6 +8,7 @@ heard. A session whose counters this steplink no longer knows is ended, and its 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
 import logging
 import time
@@ -73,25 +74,36 @@ class Archive:
         """Why nothing is stored at the moment; None while all is well."""
         return self.store.statistics().trouble
 
-    def last_ordinal(self, device: str) -> int:
-        """Return the number of the last event that a device had when the service started."""
-        return self._ordinals.get(device, 0)
+    def journal(self) -> Journal:
+        """Return a new journal over the store."""
+        return Journal(self.store, lambda device: self._ordinals.get(device, 0))
 
     async def resume(self, make_wearable: Callable[[], Wearable], lineup: Lineup, hub: Hub) -> list[Device]:
         """Return the devices of all open sessions, each as it stood when it was last stored."""
         self._ordinals = {one.device: one.last_ordinal for one in await self.store.read(lambda r: r.devices())}
+        newest = {found.key.device: found for found in await self.store.read(lambda r: r.resume())}
         devices = []
         for found in await self.store.read(lambda r: r.resume()):
+            if newest[found.key.device].key != found.key:  # its end found no way to the disk
+                await self._end(found)
+                continue
             try:
-                device = Device.restored(found, make_wearable(), hub.publish, Journal(self.store))
+                device = Device.restored(found, make_wearable(), hub.publish, self.journal())
                 await self._replay(device, found)
                 device.obey(lineup)
-            except (SnapshotError, CounterError, ParameterError, KeyError) as error:
+            except (SnapshotError, CounterError, ParameterError) as error:
                 logger.warning("the session of %s cannot go on and a new one begins: %s", found.key.device, error)
-                await self.store.append(Batch(session=found.key, ended_ns=time.time_ns()))
+                await self._end(found)
+            except Exception:  # whatever is wrong with one must not keep the others from going on
+                logger.exception("the session of %s cannot go on and a new one begins", found.key.device)
+                await self._end(found)
             else:
                 devices.append(device)
         return devices
+
+    async def _end(self, found: Resumable) -> None:
+        with contextlib.suppress(StoreError):  # then it is tried again at the next start
+            await self.store.append(Batch(session=found.key, ended_ns=time.time_ns()))
 
     async def _replay(self, device: Device, found: Resumable) -> None:
         """Count again what was stored after the last snapshot."""

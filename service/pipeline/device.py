@@ -61,7 +61,11 @@ class Device:
         self.calibrations = Calibrations(self.session)
         self.reason: str | None = UNHEARD if rssi_dbm is None else None
         self.since_ns = time.time_ns()
+        self._told_id: str | None = None
+        """The id it told in a session before."""
         self.wanted = False
+        self.spared = False
+        """Whether it is left alone for the sake of an option, and not because somebody asked for that."""
         self.asked = False
         """Whether somebody asked for it to be connected, as opposed to an option that wants all or some."""
         self.twin: Device | None = None
@@ -121,7 +125,7 @@ class Device:
         return {
             "address": self.address,
             "name": self.name,
-            "wanted": self.wanted,
+            "wanted": self.wanted or self.spared,
             "asked": self.asked,
             "lineup": self.lineup.plain(),
             "told_lineup": self._told_lineup,
@@ -130,12 +134,12 @@ class Device:
     @property
     def id(self) -> str:
         """The id the device gave itself; its address until it has."""
-        return self.session.tracker.info.device or self.address
+        return self.session.tracker.info.device or self._told_id or self.address
 
     @property
     def is_provisional(self) -> bool:
         """Whether the device has not told its id yet."""
-        return self.session.tracker.info.device is None
+        return self.session.tracker.info.device is None and self._told_id is None
 
     @property
     def is_forgettable(self) -> bool:
@@ -211,7 +215,7 @@ class Device:
 
     def want(self) -> None:
         """Have it connected as soon as it is heard."""
-        self.wanted = self.asked = True
+        self.wanted, self.asked, self.spared = True, True, False
         if self.state is State.DISCONNECTED:
             self.move(Cause.WANTED)
         else:
@@ -235,12 +239,15 @@ class Device:
 
     async def end_session(self) -> None:
         """End the session and begin another that counts from nothing; a wanted device is connected again by itself."""
-        wanted = self.wanted
+        wanted, asked = self.wanted, self.asked
+        if wanted:
+            self.unwant()
         await self._rest()
         await self.session.close(ended=True)
         self._begin_anew()
         if wanted:
             self.want()
+            self.asked = asked
 
     async def drop_session(self) -> None:
         """Leave the device alone, keep nothing of its session, and begin another that counts from nothing."""
@@ -261,6 +268,7 @@ class Device:
 
     def _begin_anew(self) -> None:
         self.calibrations.leave()
+        self._told_id = self.session.tracker.info.device
         before = self.session
         self.session = self._new_session(before.journal.successor())
         self.session.take_over(before)

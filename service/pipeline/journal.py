@@ -9,6 +9,7 @@ a device keeps itself, and those that must go are made up for by a snapshot of t
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -71,10 +72,12 @@ class Archive(Protocol):
 class Journal:
     """One session's. Without a `store` it holds the newest events in memory, and no samples."""
 
-    def __init__(self, store: Archive | None = None) -> None:
+    def __init__(self, store: Archive | None = None, last_ordinal: Callable[[str], int] = lambda _device: 0) -> None:
         self.key: SessionKey | None = None
         """Set once the device's id is known; nothing is stored before."""
         self._store = self._kept_in = store
+        self.last_ordinal = last_ordinal
+        """Number of the last event that a device had before this session."""
         self._entries: deque[LogEntry] = deque(maxlen=HELD_ENTRIES)
         self._unsure: Batch | None = None
         """On its way to the disk, or there without our knowing."""
@@ -96,6 +99,12 @@ class Journal:
         """Store under `key` from now on; `about` where the store has it already."""
         self.key, self._about = key, about
         self._changed.set()
+
+    def number_on(self, last: int) -> None:
+        """Renumber what waits, to come after the event of number `last`."""
+        moved = [dataclasses.replace(entry, ordinal=entry.ordinal + last) for entry in self._entries]
+        self._entries.clear()
+        self._entries.extend(moved)
 
     def received(self, told: Received, info: DeviceInfo, at_ns: int) -> None:
         """Take samples that are new, of a device that described itself by `info`."""
@@ -159,26 +168,26 @@ class Journal:
             await self._changed.wait()
             await asyncio.sleep(BATCH_S)
             try:
-                await self.store(standing(), clock())
+                await self.store(standing, clock)
             except Exception:  # a fault of ours with one device must not end the others' recording
                 logger.exception("storing what %s told", self.key)
 
-    async def close(self, standing: Standing, now_ns: int, *, ended: bool = False) -> None:
+    async def close(self, standing: Callable[[], Standing], clock: Callable[[], int], *, ended: bool = False) -> None:
         """Store what there is, with a snapshot; what the disk does not take now is lost. `ended` ends the session."""
         self._closing = True
         self.mark()
         try:
             async with asyncio.timeout(CLOSE_S):
-                await self.store(standing, now_ns)
+                await self.store(standing, clock)
                 if ended and self._store is not None and self.key is not None:
-                    self._unsure = Batch(session=self.key, ended_ns=now_ns)
+                    self._unsure = Batch(session=self.key, ended_ns=clock())
                     await self._send()
         except TimeoutError:
             logger.error("the disk does not take the last events and samples of %s", self.key)  # noqa: TRY400
 
     def successor(self) -> Journal:
         """Return an empty journal of the same store, for the next session."""
-        return Journal(self._kept_in)
+        return Journal(self._kept_in, self.last_ordinal)
 
     def drop(self) -> None:
         """Forget all that waits and store nothing more: the session's data are deleted."""
@@ -186,12 +195,12 @@ class Journal:
         self._entries.clear()
         self._chunks, self._descriptions, self._blocks, self._unsure = [], [], [], None
 
-    async def store(self, standing: Standing, now_ns: int) -> None:
+    async def store(self, standing: Callable[[], Standing], clock: Callable[[], int]) -> None:
         """Store what there is now; while the disk does not take it, wait and try again."""
         await self._send()
         self._changed.clear()
         if self._store is not None and self.key is not None:
-            self._unsure = self._take(self.key, standing, now_ns)
+            self._unsure = self._take(self.key, standing(), clock())
             await self._send()
 
     async def _send(self) -> None:
@@ -204,10 +213,16 @@ class Journal:
                     await asyncio.sleep(RETRY_S)
                     continue
                 if error.reason is not StoreFault.GONE:
-                    logger.error("events and samples of %s are not stored: %s", batch.session.device, error)  # noqa: TRY400
-                    self._snapshot_ns = None  # what is stored next does not go on from it
+                    self._give_up(batch, error)
+            except Exception as error:  # a fault of ours: what is next shall not suffer
+                self._give_up(batch, error)
             if self._unsure is batch:
                 self._unsure = None
+
+    def _give_up(self, batch: Batch, error: Exception) -> None:
+        """Tell that a batch is not stored; what is stored next does not go on from it and needs all that it told."""
+        logger.error("events and samples of %s are not stored: %s", batch.session.device, error)
+        self._snapshot_ns = self._about = None
 
     def _gather(self) -> None:
         """Put the samples that wait into chunks: together, since that costs a tenth of one packet at a time."""

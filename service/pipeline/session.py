@@ -7,6 +7,7 @@ their turn. What is missing is asked of the device while its live data goes on.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -36,6 +37,7 @@ from service.store.chunker import blocks
 from service.store.codec import parted
 from service.store.values import Chunk, Cursor, Description, Resumable, SessionKey
 from service.tracking.backfill import BackfillTracker
+from service.tracking.requests import Missing
 from service.wearables.contract import Write
 
 YIELD_EVERY: Final = 64
@@ -43,8 +45,11 @@ YIELD_EVERY: Final = 64
 SLICE_S: Final = 0.005
 """Longest stretch of counting again without a pause for others."""
 ANSWER_S: Final = 10.0
-"""A device that has not answered for so long is asked anew."""
+"""A device that sends nothing of what it was asked for so long is asked anew."""
+REFUSED_S: Final = 2.0
+"""Wait after a request that was refused."""
 ORDINALS_SKIPPED: Final = 1000
+EVENTS_PER_S: Final = 40
 """Numbers left out after a restart: before a crash as many may have been told that were not yet on the disk."""
 
 TELL_EVERY_NS: Final = 1_000_000_000
@@ -145,7 +150,9 @@ class Session:
     def resume(self, found: Resumable) -> None:
         """Take over what is stored of this session, before its samples are replayed; SnapshotError where it cannot."""
         self.since_ns = found.key.since_ns
-        self._ordinal = found.last_ordinal + ORDINALS_SKIPPED
+        stored_ns = found.snapshot.at_ns if found.snapshot else found.key.since_ns
+        untold_s = max(0, time.time_ns() - stored_ns) // 10**9
+        self._ordinal = found.last_ordinal + ORDINALS_SKIPPED + EVENTS_PER_S * untold_s
         self.journal.begin(found.key, found.about)
         if found.snapshot is not None:
             self.tracker.restore(found.snapshot.state["tracker"])
@@ -187,7 +194,7 @@ class Session:
 
     async def close(self, *, ended: bool = False) -> None:
         """Store what there is; `ended` ends the session for good."""
-        await self.journal.close(self._standing(), time.time_ns(), ended=ended)
+        await self.journal.close(self._standing, time.time_ns, ended=ended)
 
     def take_over(self, before: Session) -> None:
         """Go on with the event numbers of the device's session before, and tell its observers."""
@@ -237,8 +244,14 @@ class Session:
 
     def _begin_journal(self) -> None:
         """Have the session stored once its device's name is known, which is before its first sample."""
-        if self.journal.key is None:
-            self.journal.begin(SessionKey(device=self._name_device(), since_ns=self.since_ns))
+        if self.journal.key is not None:
+            return
+        device = self._name_device()
+        last = self.journal.last_ordinal(device)
+        if self._ordinal <= last:
+            self.journal.number_on(last)
+            self._ordinal += last
+        self.journal.begin(SessionKey(device=device, since_ns=self.since_ns))
 
     def _standing(self) -> Standing:
         return Standing(cursor=self._cursor(), state=self._state, about=self._about())
@@ -285,15 +298,27 @@ class Session:
             try:
                 for write in self._history(missing.boot, missing.first, missing.samples):
                     await link.request(write)
-                async with asyncio.timeout(ANSWER_S):
-                    while self.tracker.asked == missing:
-                        await self._heard.wait()
-                        self._heard.clear()
-            except LinkError as error:
+                await self._answer(missing)
+            except LinkError as error:  # refused, perhaps for now; where the link is lost, this task ends with it
                 logger.info("%s was not asked for what is missing: %s", self._name_device(), error)
-                return
-            except TimeoutError:
-                self.tracker.unanswered()
+                await asyncio.sleep(REFUSED_S)
+            except Exception:
+                logger.exception("asking %s for what is missing", self._name_device())
+                await asyncio.sleep(REFUSED_S)
+            self.tracker.unanswered()
+
+    async def _answer(self, missing: Missing) -> None:
+        """Wait for the end of an answer, as long as it goes on."""
+        loop, tally = asyncio.get_running_loop(), self.tracker.tally
+        awaited, until_s = tally.samples_awaited, loop.time() + ANSWER_S
+        while self.tracker.asked == missing and loop.time() < until_s:
+            if tally.samples_awaited < awaited:
+                until_s = loop.time() + ANSWER_S
+            awaited = tally.samples_awaited
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout_at(until_s):
+                    await self._heard.wait()
+            self._heard.clear()
 
     def _tell_faults(self) -> None:
         """Tell at once that a counter cannot count, or can again; say on the log why, once a session."""

@@ -19,7 +19,6 @@ from service.links.contract import Link
 from service.pipeline.archive import Archive
 from service.pipeline.device import Device
 from service.pipeline.hub import Hub
-from service.pipeline.journal import Journal
 from service.pipeline.lifecycle import LINKED, PATIENCE, Cause, Patience
 from service.pipeline.lineup import Lineup
 from service.pipeline.roster import Roster, told_id
@@ -138,11 +137,13 @@ class Supervisor:
 
     def _take_up(self, device: Device) -> None:
         """Go on with a stored session; its device is left alone where it was, or where others only are wanted now."""
-        is_wanted = device.wanted and (device.asked or self._is_wanted(device.id, device.address, device.name))
+        was_wanted = device.wanted
+        is_wanted = was_wanted and (device.asked or self._is_wanted(device.id, device.address, device.name))
         self.remember(device)
         device.begin_keeping()
         if not is_wanted:
             device.unwant()
+            device.spared = was_wanted
 
     def _keep(self, session: Session) -> asyncio.Task[None]:
         if self._tasks is None:
@@ -194,7 +195,7 @@ class Supervisor:
             lineup=self._lineup,
             publish=self.hub.publish,
             patience=self._patience,
-            journal=Journal(self._archive.store) if self._archive else None,
+            journal=self._archive.journal() if self._archive else None,
         )
         device.keep = self._keep
         return device

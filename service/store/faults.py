@@ -40,7 +40,10 @@ _ERRNO_FAULTS = {
 _REMEDIES = {
     StoreFault.FULL: "the disk of {path} is full: free some room, and recording goes on by itself",
     StoreFault.READ_ONLY: "{path} cannot be written: make its folder writable, and recording goes on by itself",
-    StoreFault.IO: "{path} could not be read or written ({error}): look at the disk; it is tried again",
+    StoreFault.IO: (
+        "{path} could not be read or written ({error}): are its folder and its disk there? "
+        "A running service tries again"
+    ),
     StoreFault.LOCKED: "another program holds {path}: end it, and recording goes on by itself",
     StoreFault.CORRUPT: (
         "{path} is damaged ({error}): move it away and start with a new file, or put a backup in its place; "

@@ -138,7 +138,7 @@ class BackfillTracker:
             elif isinstance(item, Booted):
                 events += self._boot(item)
             elif isinstance(item, Said):
-                if item.is_new:
+                if item.is_new and _matters(item.info):
                     events.append(self._heard(packet))
                 events += self._describe(item)
             else:
@@ -330,3 +330,13 @@ class BackfillTracker:
             self._behind.tally_awaited()
         else:
             self._requests.end()
+
+
+_PASSING: Final = frozenset({"battery_percent", "register_steps"})
+
+
+def _matters(info: DeviceInfo) -> bool:
+    """Whether a count may depend on what was said: readings that change all the time are not kept for a replay."""
+    return any(
+        getattr(info, field.name) is not None for field in dataclasses.fields(info) if field.name not in _PASSING
+    )

@@ -59,13 +59,13 @@ async def test_samples_events_and_their_place_are_one_batch():
     made = journal(disk)
     second(made, 0)
     made.log(entry(1))
-    await made.store(standing(), 0)
+    await made.store(standing, lambda: 0)
     (batch,) = disk.batches
     assert [len(chunk) for chunk in batch.chunks] == [50]
     assert [one.ordinal for one in batch.entries] == [1]
     assert batch.cursor.index == 50
     assert batch.snapshot.state == {"index": 50}
-    await made.store(standing(100), 1)
+    await made.store(lambda: standing(100), lambda: 1)
     assert disk.batches[1].snapshot is None
     assert disk.batches[1].about is None
 
@@ -74,10 +74,10 @@ async def test_nothing_is_stored_before_the_device_has_a_name():
     disk = Disk()
     made = Journal(disk)
     made.log(entry(1))
-    await made.store(standing(), 0)
+    await made.store(standing, lambda: 0)
     assert disk.batches == []
     made.begin(KEY)
-    await made.store(standing(), 0)
+    await made.store(standing, lambda: 0)
     assert [one.ordinal for one in disk.batches[0].entries] == [1]
 
 
@@ -86,7 +86,7 @@ async def test_what_was_cancelled_on_its_way_is_sent_again():
     made = journal(disk)
     made.log(entry(1))
     disk.stuck = True
-    task = asyncio.create_task(made.store(standing(), 0))
+    task = asyncio.create_task(made.store(standing, lambda: 0))
     await asyncio.sleep(0.01)
     made.log(entry(2))
     page = await made.page(LogQuery(device="dev-1"))
@@ -94,7 +94,7 @@ async def test_what_was_cancelled_on_its_way_is_sent_again():
     task.cancel()
     await asyncio.wait({task})
     disk.stuck = False
-    await made.close(standing(), 1)
+    await made.close(standing, lambda: 1)
     assert [one.ordinal for batch in disk.batches for one in batch.entries] == [1, 2]
     assert disk.batches[-1].snapshot is not None
 
@@ -106,7 +106,7 @@ async def test_a_disk_that_never_answers_does_not_hold_up_the_end(monkeypatch):
     made = journal(disk)
     made.log(entry(1))
     began_s = time.monotonic()
-    await made.close(standing(), 1)
+    await made.close(standing, lambda: 1)
     assert time.monotonic() - began_s < 0.5
 
 
@@ -114,10 +114,10 @@ async def test_a_disk_that_never_answers_does_not_hold_up_the_end(monkeypatch):
 async def test_samples_that_find_no_room_are_made_up_for_by_a_snapshot(more):
     disk = Disk()
     made = journal(disk)
-    await made.store(standing(0), 0)
+    await made.store(lambda: standing(0), lambda: 0)
     for k in range(HELD_CHUNKS + more):
         second(made, k)
-    await made.store(standing(50 * (HELD_CHUNKS + more)), 1)
+    await made.store(lambda: standing(50 * (HELD_CHUNKS + more)), lambda: 1)
     assert len(disk.batches[-1].chunks) == HELD_CHUNKS
     assert disk.batches[-1].chunks[0].index == 50 * more
     assert (disk.batches[-1].snapshot is not None) == (more > 0)
@@ -126,13 +126,13 @@ async def test_samples_that_find_no_room_are_made_up_for_by_a_snapshot(more):
 async def test_what_is_refused_for_good_is_made_up_for_by_a_snapshot(caplog):
     disk = Disk()
     made = journal(disk)
-    await made.store(standing(0), 0)
+    await made.store(lambda: standing(0), lambda: 0)
     disk.fault = StoreFault.REFUSED
     second(made, 0)
-    await made.store(standing(50), 1)
+    await made.store(lambda: standing(50), lambda: 1)
     assert "not stored" in caplog.text
     disk.fault = None
-    await made.store(standing(100), 2)
+    await made.store(lambda: standing(100), lambda: 2)
     assert disk.batches[-1].snapshot.cursor.index == 100
 
 
@@ -143,6 +143,30 @@ async def test_a_dropped_session_stores_nothing_more():
     made.drop()
     made.log(entry(2))
     second(made, 0)
-    await made.store(standing(), 0)
+    await made.store(standing, lambda: 0)
     assert disk.batches == []
     assert (await made.page(LogQuery(device="dev-1"))).entries == []
+
+
+async def test_a_batch_that_cannot_be_stored_holds_up_nothing_and_is_made_up_for(caplog):
+    disk = Disk()
+    made = journal(disk)
+    disk.append, real = None, disk.append  # whatever is called on it is a TypeError
+    second(made, 0)
+    await made.store(standing, lambda: 0)
+    assert "not stored" in caplog.text
+    disk.append = real
+    await made.store(lambda: standing(100), lambda: 1)
+    assert disk.batches[-1].snapshot.cursor.index == 100
+    assert disk.batches[-1].about == {"name": "b"}
+
+
+async def test_events_of_a_device_with_earlier_sessions_are_numbered_on():
+    disk = Disk()
+    made = Journal(disk)
+    made.log(entry(1))
+    made.log(entry(2))
+    made.number_on(40)
+    made.begin(KEY)
+    await made.store(standing, lambda: 0)
+    assert [one.ordinal for one in disk.batches[0].entries] == [41, 42]

@@ -45,7 +45,7 @@ async def crash(store, before):
 
 async def keep(one):
     """Store a batch; the first has a snapshot, those of the next 30 s have none."""
-    await one.journal.store(one._standing(), NOW_NS)
+    await one.journal.store(one._standing, lambda: NOW_NS)
 
 
 def take(one, packets):

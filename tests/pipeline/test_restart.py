@@ -1,6 +1,8 @@
 """A service that ends and starts again goes on with every session, and asks the device for what it missed."""
 
 import asyncio
+import contextlib
+import sqlite3
 
 from stage import serving
 
@@ -29,3 +31,36 @@ async def test_steps_go_on_over_a_restart(tmp_path):
     items = page["items"]
     assert items[: len(first["items"])] == first["items"]
     assert [item["steps"] for item in items] == list(range(1, len(items) + 1))
+
+
+async def test_an_option_leaves_a_device_alone_only_as_long_as_it_is_given(tmp_path):
+    path = tmp_path / "s.db"
+    async with LocalAir() as air, air.bracelet(Bracelet(WalkerSource("normal:600", seed=3)), speed=8):
+        async with serving(air, path=path) as stage:
+            await stage.until(lambda device: device["steps"] > 5)
+        async with serving(air, path=path, wanted=["another"]) as stage:
+            assert (await stage.device())["state"] == "disconnected"
+            await asyncio.sleep(1.5)
+        async with serving(air, path=path) as stage:
+            await stage.until(lambda device: device["state"] == "streaming")
+            await stage.http.post("api/v1/devices/sim-1/disconnect")
+            await stage.until(lambda device: device["state"] == "disconnected")
+        async with serving(air, path=path) as stage:
+            await asyncio.sleep(1)
+            assert (await stage.device())["state"] == "disconnected"
+
+
+async def test_a_session_that_cannot_go_on_ends_and_the_next_is_numbered_on(tmp_path):
+    path = tmp_path / "s.db"
+    async with LocalAir() as air, air.bracelet(Bracelet(WalkerSource("normal:600", seed=3)), speed=8):
+        async with serving(air, path=path) as stage:
+            await stage.until(lambda device: device["steps"] > 5)
+        with contextlib.closing(sqlite3.connect(path)) as database, database:
+            database.execute("UPDATE sessions SET about = json_set(about, '$.lineup[0].name', 'gone')")
+        async with serving(air, path=path) as stage:
+            await stage.poll("devices", lambda page: [item["id"] for item in page["items"]] == ["sim-1"])
+            anew = await stage.until(lambda device: device["steps"] > 5)
+            page = await stage.poll("devices/sim-1/steps?limit=1000", lambda page: len(page["items"]) > 10)
+        assert anew["steps"] < len(page["items"])
+        ordinals = [item["ordinal"] for item in page["items"]]
+        assert ordinals == sorted(set(ordinals))
