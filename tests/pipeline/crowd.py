@@ -1,7 +1,7 @@
-"""A process with an air and a crowd of bracelets, all walking; argument 1 is how many there are.
+"""A process with an air and a crowd of bracelets, all walking.
 
-It says its address first. At "away" on its input the first one leaves, measures for ten minutes and comes back; then it
-says "back".
+Argument 1 is how many there are, the others are their sensors. It says its address first. At "away" on its input the
+first one leaves, measures for ten minutes and comes back; then it says "back".
 """
 
 import asyncio
@@ -12,6 +12,7 @@ from device_sim.air import LocalAir
 from device_sim.air_tcp import AirServer
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
+from service.samples import Sensor
 
 AWAY_S = 590
 """A little less than the bracelet keeps: what goes on meanwhile must not overwrite the first of it."""
@@ -23,11 +24,11 @@ def say(word):
     sys.stdout.flush()
 
 
-async def main(bracelets):
+async def main(bracelets, sensors):
     async with contextlib.AsyncExitStack() as stack:
         air = await stack.enter_async_context(LocalAir())
         server = await stack.enter_async_context(AirServer(air))
-        worn = [Bracelet(Walker(SCRIPT, seed=n), device_id=f"sim-{n}") for n in range(bracelets)]
+        worn = [Bracelet(Walker(SCRIPT, seed=n, sensors=sensors), device_id=f"sim-{n}") for n in range(bracelets)]
         first, *_ = [await stack.enter_async_context(air.bracelet(one)) for one in worn]
         say(server.address)
         while (await asyncio.to_thread(sys.stdin.readline)).strip() == "away":
@@ -41,4 +42,4 @@ async def main(bracelets):
 
 
 if __name__ == "__main__":
-    asyncio.run(main(int(sys.argv[1])))
+    asyncio.run(main(int(sys.argv[1]), tuple(map(Sensor, sys.argv[2:]))))
