@@ -75,16 +75,19 @@ async def staged(bracelet, *others, **options):
         yield await stack.enter_async_context(serving(air, gatts, **service))
 
 
-SERVICE = {"durable_limit", "wanted", "counter", "beside", "path", "keep"}
+SERVICE = {"durable_limit", "wanted", "counter", "beside", "path", "keep", "disk"}
 """Options that are the service's and not the bracelet's radio's."""
 
 
 @contextlib.asynccontextmanager
-async def serving(air, gatts=(), *, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), path=None, keep=None):
-    """Run the service over an air that is there; it stores at `path`, else where nobody looks."""
+async def serving(
+    air, gatts=(), *, durable_limit=1000, wanted=None, counter=DEFAULT, beside=(), path=None, keep=None, disk=None
+):
+    """Run the service over an air that is there; it stores at `path`, else where nobody looks, on `disk` if given."""
     async with contextlib.AsyncExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
-        store = await stack.enter_async_context(open_store(path or Path(folder) / "s.db", queue_batches=100))
+        how = {} if disk is None else {"connect": disk.connect, "retry_s": 0.1}
+        store = await stack.enter_async_context(open_store(path or Path(folder) / "s.db", queue_batches=100, **how))
         central = await stack.enter_async_context(air.central())
         supervisor = Supervisor(
             hub=Hub(durable_limit=durable_limit),

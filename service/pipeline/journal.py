@@ -255,7 +255,7 @@ class Journal:
         self._about = standing.about
         batch = Batch(
             session=key,
-            chunks=[*self._chunks, *self._chunker.flush()],
+            chunks=[*self._chunks, *self._chunker.begun()],
             descriptions=self._descriptions,
             entries=tuple(self._entries),
             cursor=cursor,

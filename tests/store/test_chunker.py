@@ -34,7 +34,7 @@ def blocks(cuts, *, run=0, gyro=False):
 def chunked(parts, layout=made.LAYOUT):
     chunker = Chunker()
     chunks = [chunk for block in parts for chunk in chunker.add(block, run=0, layout=layout, at_ns=made.SINCE_NS)]
-    return chunks + chunker.flush()
+    return chunks + chunker.begun()
 
 
 @settings(max_examples=30)
@@ -67,21 +67,41 @@ def test_pieces_have_the_tick_of_the_stretch_they_begin_in():
     assert list(by_stretch(unknown)) == [unknown]
 
 
-def test_a_hole_ends_a_chunk():
+def test_nothing_is_joined_over_a_hole():
     found = chunked([*blocks([0, 10, 20]), *blocks([30, 50, 60])])
-    assert [(chunk.index, chunk.end) for chunk in found] == [(0, 20), (30, 50), (50, 60)]
+    assert sorted((chunk.index, chunk.end) for chunk in found) == [(0, 20), (30, 50), (50, 60)]
 
 
-def test_another_run_layout_or_sensor_ends_a_chunk():
+def test_live_samples_and_history_in_turns_give_whole_chunks():
+    turns = zip(blocks(range(1000, 1401, 8)), blocks(range(0, 401, 8)), strict=True)
+    found = chunked(block for both in turns for block in both)
+    assert sorted((chunk.index, chunk.end) for chunk in found) == [
+        (first + k, first + k + 50) for first in (0, 1000) for k in range(0, 400, 50)
+    ]
+
+
+def test_what_has_begun_is_told_when_it_has_grown_and_goes_on():
+    chunker = Chunker()
+    parts = [*blocks([0, 10, 20, 50])]
+    told = []
+    for part in parts:
+        told += chunker.add(part, run=0, layout=made.LAYOUT, at_ns=made.SINCE_NS)
+        told += chunker.begun()
+        assert chunker.begun() == []
+    assert [(chunk.index, chunk.end) for chunk in told] == [(0, 10), (0, 20), (0, 50)]
+
+
+def test_another_run_layout_or_sensor_is_another_chunk():
     chunker = Chunker()
     (first,) = blocks([0, 10])
     (second,) = blocks([10, 20], gyro=True)
     other = Layout(rate_hz=50.0, lsb_per_g=2048.0, lsb_per_rad_s=1000.0)
     assert chunker.add(first, run=0, layout=made.LAYOUT, at_ns=1) == []
-    assert [len(chunk) for chunk in chunker.add(first, run=1, layout=made.LAYOUT, at_ns=2)] == [10]
+    assert chunker.add(first, run=1, layout=made.LAYOUT, at_ns=2) == []
     (ended,) = chunker.add(second, run=1, layout=other, at_ns=3)
-    assert (ended.run, ended.gyro, ended.at_ns) == (1, None, 2)
-    (last,) = chunker.flush()
+    assert (ended.run, len(ended), ended.at_ns) == (0, 10, 1)
+    before, last = chunker.begun()
+    assert (before.run, before.gyro, before.at_ns) == (1, None, 2)
     assert np.frombuffer(last.gyro, "<i2")[0] == round(second.gyro_rad_s[0][0] * 1000)
 
 

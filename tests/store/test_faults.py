@@ -1,7 +1,6 @@
 """A disk that is full, read-only or slow: nothing acknowledged is lost, and recording goes on by itself."""
 
 import asyncio
-import contextlib
 import functools
 import os
 import sqlite3
@@ -10,49 +9,14 @@ import time
 
 import pytest
 from store import made
+from store.disk import Disk, small_disk
 
 from service.errors import StoreError, StoreFault
-from service.store import database
 from service.store.store import open_store
 from service.store.values import LogQuery
 
 KEY = made.session()
 MIB = 1 << 20
-
-
-class Disk:
-    """Connections to a database whose size, errors and speed a test decides."""
-
-    def __init__(self):
-        self.pages = 1 << 30
-        self.fault = None
-        self.commit_s = 0.0
-        self.opened = 0
-
-    def connect(self, path):
-        self.opened += 1
-        return Connection(self, database.connect_writer(path))
-
-
-class Connection:
-    """A connection of `disk`."""
-
-    def __init__(self, disk, real):
-        self._disk, self._real = disk, real
-
-    def execute(self, sql, *values):
-        if sql == "BEGIN IMMEDIATE":
-            self._real.execute(f"PRAGMA max_page_count = {self._disk.pages}")
-        if sql == "COMMIT":
-            time.sleep(self._disk.commit_s)
-            if self._disk.fault is not None:
-                error = sqlite3.OperationalError("made")
-                error.sqlite_errorcode = self._disk.fault
-                raise error
-        return self._real.execute(sql, *values)
-
-    def __getattr__(self, name):
-        return getattr(self._real, name)
 
 
 @pytest.fixture
@@ -114,17 +78,6 @@ async def test_a_database_that_may_not_grow(opened, disk):
     async with opened() as store:
         disk.pages = 45
         await check_room_brings_it_back(store, lambda: setattr(disk, "pages", 1 << 30), StoreFault.FULL)
-
-
-@contextlib.contextmanager
-def small_disk(path, size):
-    made_it = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", path], check=False)
-    if made_it.returncode:
-        pytest.skip("this account may not mount a small disk")
-    try:
-        yield path
-    finally:
-        subprocess.run(["umount", "-l", path], check=True)
 
 
 @pytest.mark.full
