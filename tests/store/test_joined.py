@@ -55,7 +55,7 @@ def chunks(arrived):
     chunker, made = Chunker(), []
     for told, at_ns in arrived:
         made += chunker.add(told.block, run=told.run, layout=LAYOUT, at_ns=at_ns)
-    return [dataclasses.replace(chunk, at_ns=0) for chunk in made + chunker.flush()]
+    return [dataclasses.replace(chunk, at_ns=0) for chunk in made + chunker.begun()]
 
 
 def test_what_goes_on_is_one_block_up_to_the_next_tick_and_keeps_what_is_saturated():
