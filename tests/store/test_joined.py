@@ -1,7 +1,5 @@
 """Joined packets are stored as the packets themselves are."""
 
-import dataclasses
-
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -40,7 +38,7 @@ PACKETS = st.lists(
 
 
 @given(packets=PACKETS, reboot_at=st.integers(0, 80))
-def test_the_same_chunks_come_of_it(packets, reboot_at):
+def test_the_same_samples_and_ticks_are_stored(packets, reboot_at):
     arrived, index, run = [], 5, 0
     for k, (n, hole, gyro, tick) in enumerate(packets):
         if k == reboot_at:
@@ -48,14 +46,22 @@ def test_the_same_chunks_come_of_it(packets, reboot_at):
         index += hole
         arrived.append((Received(run=run, block=block(index, n, 1 + run, gyro=gyro and k > 30, tick=tick)), k))
         index += n
-    assert [chunks(arrived)] == [chunks(list(joined(arrived)))]
+    assert stored(arrived) == stored(list(joined(arrived)))
 
 
-def chunks(arrived):
+def stored(arrived):
     chunker, made = Chunker(), []
     for told, at_ns in arrived:
         made += chunker.add(told.block, run=told.run, layout=LAYOUT, at_ns=at_ns)
-    return [dataclasses.replace(chunk, at_ns=0) for chunk in made + chunker.begun()]
+    samples, ticks = {}, {}
+    for chunk in made + chunker.begun():
+        for i in range(len(chunk)):
+            gyro = chunk.gyro and chunk.gyro[6 * i : 6 * i + 6]
+            samples[chunk.run, chunk.index + i] = (chunk.boot, chunk.layout, chunk.acc[6 * i : 6 * i + 6], gyro)
+        for k, tick in enumerate(chunk.ticks, chunk.index // TICK_EVERY):
+            if tick is not None:
+                ticks[chunk.run, k] = tick
+    return samples, ticks
 
 
 def test_what_goes_on_is_one_block_up_to_the_next_tick_and_keeps_what_is_saturated():
