@@ -163,7 +163,7 @@ async def _sim(options: argparse.Namespace) -> None:
 
 async def _serve_with(settings: Settings, backend: Backend, path: Path, *, wanted: Sequence[str] | None = None) -> None:
     from service.api.app import create_app  # noqa: PLC0415
-    from service.api.server import address, listen, serve  # noqa: PLC0415
+    from service.api.server import address, listen, serve, spare_what_is_loaded  # noqa: PLC0415
     from service.pipeline.archive import Archive, Keep  # noqa: PLC0415
     from service.store.store import open_store  # noqa: PLC0415
 
@@ -173,6 +173,7 @@ async def _serve_with(settings: Settings, backend: Backend, path: Path, *, wante
         url = address(bound)
 
         def ready() -> None:
+            spare_what_is_loaded()
             say(f"steplink {version('steplink')} is at {url}  (Ctrl-C ends it)")
 
         async with open_store(path, queue_batches=QUEUE_BATCHES) as store:
