@@ -193,7 +193,12 @@ class Session:
             tasks.create_task(self._catch_up())
 
     async def close(self, *, ended: bool = False) -> None:
-        """Store what there is; `ended` ends the session for good."""
+        """Store what there is; `ended` ends the session for good: what is missing is lost, what is pending decided."""
+        if ended:
+            while self.tracker.has_work:
+                self.catch_up()
+                await asyncio.sleep(0)
+            self._tell_all(self.tracker.finish(), self.tracker.cursor[0], time.time_ns())
         await self.journal.close(self._standing, time.time_ns, ended=ended)
 
     def take_over(self, before: Session) -> None:

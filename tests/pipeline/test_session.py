@@ -8,7 +8,7 @@ from fakes import MetronomeCounter, data_packet, data_packets, described
 from service.pipeline.lineup import lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Session
-from service.samples import GRID_HZ, Gridded, Rebooted, Sensor, Step, StepCounted, Update
+from service.samples import GRID_HZ, Gap, Gridded, Rebooted, Sensor, Step, StepCounted, Update
 from service.tracking.backfill import BackfillTracker
 from service.wearables import bracelet as wire
 
@@ -106,3 +106,19 @@ def test_a_sensor_that_comes_and_goes_is_on_the_log_once_and_told_each_time(capl
     assert len(caplog.records) == 1
     assert "does not send" in caplog.text
     assert changes >= 4
+
+
+async def test_a_session_that_ends_decides_what_is_pending_and_tells_what_was_behind_a_hole():
+    told = []
+    made = session(told)
+    for packet in data_packets([10] * 10):
+        made.apply(packet)
+    for packet in data_packets([10] * 3, start=120):
+        made.apply(packet)
+    before = len([notice for notice in told if isinstance(notice.event, StepCounted)])
+    await made.close(ended=True)
+    steps = [notice.event for notice in told if isinstance(notice.event, StepCounted)]
+    assert before == 4
+    assert [step.steps for step in steps] == list(range(1, len(steps) + 1))
+    assert steps[-1].step.at_s == 3.0
+    assert [notice.event.samples for notice in told if isinstance(notice.event, Gap)] == [20]
