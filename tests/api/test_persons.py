@@ -18,6 +18,7 @@ def walking():
     return Bracelet(WalkerSource("normal:600", seed=3))
 
 
+@pytest.mark.full
 async def test_a_persons_data_are_gone_for_good_and_the_device_is_left_alone(tmp_path):
     path = tmp_path / "s.db"
     async with staged(walking(), speed=8, path=path) as stage:
@@ -41,6 +42,7 @@ async def test_a_persons_data_are_gone_for_good_and_the_device_is_left_alone(tmp
         assert anew["steps"] < 10
 
 
+@pytest.mark.full
 async def test_another_person_gets_a_session_of_their_own(tmp_path):
     async with staged(walking(), speed=8, path=tmp_path / "s.db") as stage:
         before = await stage.until(lambda device: device["steps"] > 10)

@@ -36,6 +36,7 @@ async def test_a_counter_that_needs_more_than_the_device_has_is_refused_as_the_p
         assert (await stage.device())["counter_faults"] == {"gyro_zero_crossing": why}
 
 
+@pytest.mark.full
 async def test_a_service_whose_counter_the_device_cannot_serve_says_so(caplog):
     with caplog.at_level(logging.WARNING):
         async with staged(worn(), counter="fusion", **FLAT_OUT) as stage:
@@ -55,6 +56,7 @@ async def test_a_counter_of_the_gyroscope_counts_on_a_device_that_has_one():
         assert (device["sensors"], device["counter_faults"]) == (list(ALL), {})
 
 
+@pytest.mark.full
 async def test_at_the_smallest_mtu_the_field_is_left_out_and_the_device_says_so():
     async with staged(worn(sensors=ALL), beside=["gyro_zero_crossing", "fusion"], max_mtu=23, **FLAT_OUT) as stage:
         device = await stage.until(lambda device: device["counters"]["gyro_zero_crossing"] > 20)
@@ -64,6 +66,7 @@ async def test_at_the_smallest_mtu_the_field_is_left_out_and_the_device_says_so(
     assert (device["samples_lost"], device["packets_bad"]) == (0, 0)
 
 
+@pytest.mark.full
 async def test_under_ten_samples_a_second_nothing_is_counted_and_the_device_says_why():
     async with staged(worn(rate_hz=5.0), **FLAT_OUT) as stage:
         device = await stage.until(lambda device: device["samples"] >= 200)

@@ -35,6 +35,7 @@ async def delivers(backend, sighting):
     return False
 
 
+@pytest.mark.full
 async def test_a_link_whose_host_never_asks_for_anything_is_given_up(monkeypatch):
     monkeypatch.setattr(peripheral, "UNASKED_S", 1.0)
     async with on_air() as (gatt, backend):

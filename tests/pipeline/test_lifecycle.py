@@ -3,7 +3,7 @@
 from itertools import product
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from service.pipeline.lifecycle import (
@@ -108,6 +108,7 @@ def test_the_back_off_grows_and_is_spread():
     assert PATIENCE.wait_s(30, 0.999999) == pytest.approx(30, rel=1e-3)
 
 
+@settings(max_examples=40)
 @given(st.data())
 def test_any_life_waits_as_it_should(data):
     """Any legal causes at any times: the wait is bounded, grows with failures in a row, and health ends the row."""

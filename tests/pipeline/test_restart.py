@@ -4,11 +4,14 @@ import asyncio
 import contextlib
 import sqlite3
 
+import pytest
 from stage import serving
 
 from device_sim.air import LocalAir
 from device_sim.bracelet import Bracelet
 from device_sim.source import WalkerSource
+
+pytestmark = pytest.mark.full
 
 
 async def test_steps_go_on_over_a_restart(tmp_path):
