@@ -10,6 +10,7 @@ from links.air import link_to, on_air
 from service.errors import LinkError, LinkFault
 from service.links.ble import Backend, close_stale
 from service.wearables import bracelet as wire
+from service.wearables import bracelet_control as control
 from service.wearables.contract import Read
 
 
@@ -65,8 +66,12 @@ async def test_without_a_disconnect_each_reconnect_brings_one_copy_more():
             await bleak.connect()
             heard.clear()
             await bleak.start_notify(wire.DATA, lambda _, data: heard.append(bytes(data)))
-            while len(set(heard)) < 5:  # noqa: ASYNC110  # the callback tells nobody
-                await asyncio.sleep(0.01)
+            await bleak.start_notify(wire.CONTROL, lambda *_: None)
+            begin = control.start()
+            await bleak.write_gatt_char(begin.characteristic, begin.data, response=True)
+            async with asyncio.timeout(10):
+                while len(set(heard)) < 5:  # noqa: ASYNC110  # the callback tells nobody
+                    await asyncio.sleep(0.01)
             copies.append(heard.count(heard[0]))
             await gatt.drop_link()
         assert copies == [1, 2, 3]
