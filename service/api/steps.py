@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -35,6 +36,10 @@ class StepsQuery(BaseModel):
     )
     to: datetime | None = Field(default=None, description="Host time before which steps are told, with an offset")
     counter: str | None = Field(default=None, description="Only this counter's; all where it is left out")
+    session: Literal["current", "all"] = Field(
+        default="current",
+        description="`all`: those of earlier sessions too, perhaps another person's; each counts its `steps` from 1",
+    )
     limit: int = Field(default=100, ge=1, le=PAGE_LIMIT, description=f"Most steps of one page, 1–{PAGE_LIMIT}")
 
 
@@ -47,7 +52,10 @@ async def list_page(device: Device, query: StepsQuery) -> models.Page[models.Ste
         raise ParameterError("counter", query.counter, f"one of {', '.join(registry.COUNTERS)}")
     asked = LogQuery(
         device=device.id,
-        after=_ordinal(query.after, device) if query.after else 0,
+        after=max(
+            _ordinal(query.after, device) if query.after else 0,
+            device.session.after if query.session == "current" else 0,
+        ),
         from_ns=None if query.from_ is None else nanoseconds(query.from_),
         to_ns=None if query.to is None else nanoseconds(query.to),
         kinds=frozenset({STEP}),

@@ -129,6 +129,7 @@ class Device:
             "asked": self.asked,
             "lineup": self.lineup.plain(),
             "told_lineup": self._told_lineup,
+            "after": self.session.after,
         }
 
     @property

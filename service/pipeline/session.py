@@ -87,7 +87,8 @@ class Session:
         self._about = about
         self._clocks = {0: HostClock()}
         """By run: what is counted late may belong to an earlier one."""
-        self._ordinal = 0
+        self.after = self._ordinal = 0
+        """Numbers of the last event before the session, and of its newest."""
         self._told_ns = self._arrived_ns = 0
         self._faults: dict[str, str] = {}
         self._warned: set[str] = set()
@@ -150,6 +151,7 @@ class Session:
     def resume(self, found: Resumable) -> None:
         """Take over what is stored of this session, before its samples are replayed; SnapshotError where it cannot."""
         self.since_ns = found.key.since_ns
+        self.after = (found.about or {}).get("after", 0)
         stored_ns = found.snapshot.at_ns if found.snapshot else found.key.since_ns
         untold_s = max(0, time.time_ns() - stored_ns) // 10**9
         self._ordinal = found.last_ordinal + ORDINALS_SKIPPED + EVENTS_PER_S * untold_s
@@ -203,7 +205,7 @@ class Session:
 
     def take_over(self, before: Session) -> None:
         """Go on with the event numbers of the device's session before, and tell its observers."""
-        self._ordinal = before._ordinal
+        self.after = self._ordinal = before._ordinal
         self.observers += before.observers
 
     def tell(self, event: Told, at_ns: int, run: int | None = None) -> None:
@@ -256,6 +258,7 @@ class Session:
         if self._ordinal <= last:
             self.journal.number_on(last)
             self._ordinal += last
+            self.after = last
         self.journal.begin(SessionKey(device=device, since_ns=self.since_ns))
 
     def _standing(self) -> Standing:

@@ -38,13 +38,13 @@ _ERRNO_FAULTS = {
     errno.EPERM: StoreFault.READ_ONLY,
 }
 _REMEDIES = {
-    StoreFault.FULL: "the disk of {path} is full: free some room, and recording goes on by itself",
-    StoreFault.READ_ONLY: "{path} cannot be written: make its folder writable, and recording goes on by itself",
+    StoreFault.FULL: "the disk of {path} is full: free some room; a running service then goes on by itself",
+    StoreFault.READ_ONLY: "{path} cannot be written: make its folder writable; a running service then goes on itself",
     StoreFault.IO: (
-        "{path} could not be read or written ({error}): are its folder and its disk there? "
-        "A running service tries again"
+        "{path} could not be read or written ({error}): is it a file, and are its folder and disk there? "
+        "A running service goes on trying"
     ),
-    StoreFault.LOCKED: "another program holds {path}: end it, and recording goes on by itself",
+    StoreFault.LOCKED: "another program holds {path}: end it; a running service then goes on by itself",
     StoreFault.CORRUPT: (
         "{path} is damaged ({error}): move it away and start with a new file, or put a backup in its place; "
         "`sqlite3 {path} .recover` saves what can be read"

@@ -131,13 +131,18 @@ class Store:
         return query(reader)
 
     async def close(self) -> None:
-        """Write what is queued, within CLOSE_S, and end every thread."""
-        if not await asyncio.to_thread(self._writer.close, CLOSE_S):
-            for future in [future for future in self._waiting if not future.done()]:
-                future.set_exception(StoreError(StoreFault.CLOSED, "the disk did not answer before the store closed"))
+        """End every reader, then write what is queued, within CLOSE_S, and end the writer.
+
+        The writer is the last, so that the journal is emptied into the database: the one file is all there is.
+        """
+        for connection in self._connections:
+            connection.interrupt()
         await asyncio.to_thread(self._threads.shutdown, cancel_futures=True)
         for connection in self._connections:
             connection.close()
+        if not await asyncio.to_thread(self._writer.close, CLOSE_S):
+            for future in [future for future in self._waiting if not future.done()]:
+                future.set_exception(StoreError(StoreFault.CLOSED, "the disk did not answer before the store closed"))
 
 
 PROMISES: tuple[type[Recorder], type[Keeper]] = (Store, Store)

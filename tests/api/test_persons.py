@@ -52,6 +52,11 @@ async def test_another_person_gets_a_session_of_their_own(tmp_path):
         await stage.http.put(PERSON, json={"person": "P2"})
         after = await stage.until(lambda device: device["state"] == "streaming" and device["samples"] > 100)
         assert after["session_since"] > before["session_since"]
+        await stage.until(lambda device: device["steps"] > 2)
+        own = (await stage.http.get("api/v1/devices/sim-1/steps")).json()["items"]
+        assert own[0]["steps"] == 1
+        every = (await stage.http.get("api/v1/devices/sim-1/steps?session=all&limit=1000")).json()["items"]
+        assert len(every) > len(own) + 9
         answer = await stage.http.delete("api/v1/persons/P1")
         assert answer.json() == {"sessions": 1}
         assert (await stage.device())["state"] == "streaming"

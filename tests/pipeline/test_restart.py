@@ -63,7 +63,10 @@ async def test_a_session_that_cannot_go_on_ends_and_the_next_is_numbered_on(tmp_
         async with serving(air, path=path) as stage:
             await stage.poll("devices", lambda page: [item["id"] for item in page["items"]] == ["sim-1"])
             anew = await stage.until(lambda device: device["steps"] > 5)
-            page = await stage.poll("devices/sim-1/steps?limit=1000", lambda page: len(page["items"]) > 10)
+            path = "devices/sim-1/steps?limit=1000"
+            page = await stage.poll(f"{path}&session=all", lambda page: len(page["items"]) > 10)
+            own = await stage.poll(path, lambda page: page["items"])
+        assert [item["steps"] for item in own["items"]] == list(range(1, len(own["items"]) + 1))
         assert anew["steps"] < len(page["items"])
         ordinals = [item["ordinal"] for item in page["items"]]
         assert ordinals == sorted(set(ordinals))

@@ -143,3 +143,12 @@ async def test_a_check_finds_what_contradicts_itself(filled):
     with contextlib.closing(database.connect_reader(filled)) as connection, pytest.raises(StoreError) as error:
         database.check(connection, filled)
     assert error.value.reason is StoreFault.CORRUPT
+
+
+async def test_a_store_that_was_closed_is_one_file(tmp_path):
+    path = tmp_path / "s.db"
+    async with open_store(path, queue_batches=10) as store:
+        await store.append(made.second(made.session("dev-1"), 0))
+        await store.read(lambda reader: reader.devices())
+        assert path.with_name("s.db-wal").exists()
+    assert {file.name for file in tmp_path.iterdir()} <= {"s.db", "s.db.lock"}
