@@ -34,7 +34,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     """Add an option for each of the service's settings."""
     for field in dataclasses.fields(Settings):
         meta = field.metadata
-        span = f", {meta['low']}–{meta['high']} {meta['unit']}".rstrip() if meta["low"] is not None else ""
+        span = f", {meta['low']:g}–{meta['high']:g} {meta['unit']}".rstrip() if meta["low"] is not None else ""
         repeated = isinstance(field.default, tuple)
         parser.add_argument(
             f"--{field.name.replace('_', '-')}",

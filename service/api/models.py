@@ -169,9 +169,9 @@ class CorrectionEvent(_Durable):
     """Samples came late, and what was told behind them has been counted again: by how much that changed it."""
 
     type: Literal["correction"] = "correction"
-    boot: int
-    from_s: float
-    to_s: float
+    boot: int = Field(description="Boot that the times belong to", examples=[1])
+    from_s: float = Field(description="Device time from which was counted again", examples=[22.4])
+    to_s: float = Field(description="Device time up to which was counted again", examples=[55.5])
     removed: int = Field(description="Steps told as likely that are none", examples=[1])
     added: int = Field(description="Steps that had not been told", examples=[2])
 
@@ -183,9 +183,9 @@ class AwaitedEvent(_Event):
     """
 
     type: Literal["awaited"] = "awaited"
-    from_s: float
-    to_s: float
-    samples: int
+    from_s: float = Field(description="Device time of the last sample before them", examples=[22.4])
+    to_s: float = Field(description="Device time of the first sample after them", examples=[42.4])
+    samples: int = Field(description="How many are missing", examples=[1000])
 
 
 class GapEvent(_Durable):

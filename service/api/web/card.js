@@ -24,8 +24,6 @@ const STATES = {
 /** States in which the server holds the device or tries to; the button then offers to let it go. */
 const HELD = new Set(["connecting", "streaming", "lost"]);
 const LOW_BATTERY_PERCENT = 20;
-/** What is fetched within a moment is not worth a sentence. */
-const AWAITED_S = 2;
 const LEVEL_WIDTH = 17;
 
 export class Card {
@@ -183,7 +181,7 @@ export class Card {
     this.#text("packets-more", odd.map(([count, word]) => `${whole(count ?? 0)} ${word}`).join(", "));
     this.#text("lost", percent(device.samples_lost, device.samples));
     const lost = `${whole(device.samples_lost)} of ${whole(device.samples_lost + device.samples)}`;
-    this.#text("lost-more", device.samples_awaited ? `${lost}, ${whole(device.samples_awaited)} awaited` : lost);
+    this.#text("lost-more", [lost, awaited(device)].filter(Boolean).join("; "));
     this.#text("limit", whole(device.samples_saturated));
     this.#fields["limit-row"].hidden = !device.samples_saturated;
     this.#text("gaps", whole(device.gaps));
@@ -253,14 +251,15 @@ export function notice(device, now) {
   }
   if (state === "disconnected") return `Disconnected since ${at}${why}.`;
   const said = reason ? `${STATES[state] ?? state}: ${reason}` : "";
-  return [faultNotice(device), said, state === "streaming" ? awaitedNotice(device) : ""].filter(Boolean).join(" ");
+  return [faultNotice(device), said].filter(Boolean).join(" ");
 }
 
-/** Say that something missed is being fetched, where it is more than a moment. */
-function awaitedNotice({ samples_awaited: samples, measured_rate_hz: measuredHz, rate_hz: nominalHz }) {
-  const seconds = (samples ?? 0) / (measuredHz ?? nominalHz ?? 50);
-  if (seconds < AWAITED_S) return "";
-  return `Asking for ${duration(seconds)} that were missed. Until they are here, later steps are pending.`;
+/** Say what is being fetched, below the plot: a sentence above it would move the count when it comes and goes. */
+function awaited({ samples_awaited: samples, measured_rate_hz: measuredHz, rate_hz: nominalHz }) {
+  if (!samples) return "";
+  const seconds = Math.ceil(samples / (measuredHz ?? nominalHz ?? 50));
+  const length = seconds < 60 ? `${seconds}\u00a0s` : `${Math.floor(seconds / 60)}\u00a0min ${seconds % 60}\u00a0s`;
+  return `${length} more are asked for, until then later steps are pending`;
 }
 
 function strength(dbm) {
