@@ -244,6 +244,25 @@ def test_a_bad_recording_is_one_line(tmp_path, capsys, name):
     assert said.count("\n") == 1
 
 
+@pytest.mark.full
+def test_a_store_in_use_or_none_is_one_line(tmp_path):
+    store, text = tmp_path / "s.db", tmp_path / "text.db"
+    text.write_text("no database")
+    port = free_port()
+    with running("serve", "--port", port, "--store", store):
+        wait_for(lambda: httpx.get(f"http://127.0.0.1:{port}/healthz", trust_env=False).json())
+        for path, said in (
+            (store, "in use by another steplink"),
+            (text, "no database of steplink"),
+            (tmp_path, "file"),
+        ):
+            refused = run("serve", "--port", 0, "--store", path)
+            assert refused.returncode == 2
+            assert said in refused.stderr
+            assert len(refused.stderr.strip().splitlines()) == 1
+    assert text.read_text() == "no database"
+
+
 def test_a_port_in_use_is_one_line():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -81,9 +81,10 @@ class Archive:
     async def resume(self, make_wearable: Callable[[], Wearable], lineup: Lineup, hub: Hub) -> list[Device]:
         """Return the devices of all open sessions, each as it stood when it was last stored."""
         self._ordinals = {one.device: one.last_ordinal for one in await self.store.read(lambda r: r.devices())}
-        newest = {found.key.device: found for found in await self.store.read(lambda r: r.resume())}
+        open_ones = await self.store.read(lambda r: r.resume())
+        newest = {found.key.device: found for found in open_ones}
         devices = []
-        for found in await self.store.read(lambda r: r.resume()):
+        for found in open_ones:
             if newest[found.key.device].key != found.key:  # its end found no way to the disk
                 await self._end(found)
                 continue
@@ -138,9 +139,9 @@ class Archive:
         """Make a person the owner of a device and of its session; another person's session ends, and one begins."""
         owners = await self.store.read(lambda r: {one.key: one.person for one in r.sessions(device.id)})
         key = device.session.journal.key
+        await self.store.assign(device.id, person)  # first: the session that then begins is theirs
         if key is not None and owners.get(key) not in {None, person}:
             await device.end_session()
-        await self.store.assign(device.id, person)
 
     async def forget(self, person: str, devices: Iterable[Device]) -> tuple[int, list[Device]]:
         """Delete all data of a person for good; return how many sessions were deleted, and devices that were in use.

@@ -51,15 +51,15 @@ logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
-    """Where a session stands: what its count awaits, and whatever a restart needs, made only when it is asked for."""
+class RestartPoint:
+    """Where a session stands, for a restart: what its count awaits, its state (made when asked for), and what else."""
 
     cursor: Cursor | None
     state: Callable[[], Mapping[str, Any]]
     about: Mapping[str, Any]
 
 
-class Archive(Protocol):
+class JournalStore(Protocol):
     """What a journal needs of a store."""
 
     async def append(self, batch: Batch) -> None:
@@ -72,7 +72,9 @@ class Archive(Protocol):
 class Journal:
     """One session's. Without a `store` it holds the newest events in memory, and no samples."""
 
-    def __init__(self, store: Archive | None = None, last_ordinal: Callable[[str], int] = lambda _device: 0) -> None:
+    def __init__(
+        self, store: JournalStore | None = None, last_ordinal: Callable[[str], int] = lambda _device: 0
+    ) -> None:
         self.key: SessionKey | None = None
         """Set once the device's id is known; nothing is stored before."""
         self._store = self._kept_in = store
@@ -162,7 +164,7 @@ class Journal:
         more = len(entries) > query.limit
         return LogPage(entries=entries[: query.limit], next_after=entries[query.limit - 1].ordinal if more else None)
 
-    async def keep(self, standing: Callable[[], Standing], clock: Callable[[], int]) -> None:
+    async def keep(self, standing: Callable[[], RestartPoint], clock: Callable[[], int]) -> None:
         """Store a batch a second while there is something to store; `clock` is host UTC in ns. Never ends by itself."""
         while True:
             await self._changed.wait()
@@ -172,7 +174,9 @@ class Journal:
             except Exception:  # a fault of ours with one device must not end the others' recording
                 logger.exception("storing what %s told", self.key)
 
-    async def close(self, standing: Callable[[], Standing], clock: Callable[[], int], *, ended: bool = False) -> None:
+    async def close(
+        self, standing: Callable[[], RestartPoint], clock: Callable[[], int], *, ended: bool = False
+    ) -> None:
         """Store what there is, with a snapshot; what the disk does not take now is lost. `ended` ends the session."""
         self._closing = True
         self.mark()
@@ -195,7 +199,7 @@ class Journal:
         self._entries.clear()
         self._chunks, self._descriptions, self._blocks, self._unsure = [], [], [], None
 
-    async def store(self, standing: Callable[[], Standing], clock: Callable[[], int]) -> None:
+    async def store(self, standing: Callable[[], RestartPoint], clock: Callable[[], int]) -> None:
         """Store what there is now; while the disk does not take it, wait and try again."""
         await self._send()
         self._changed.clear()
@@ -242,7 +246,7 @@ class Journal:
             del self._chunks[: len(self._chunks) - HELD_CHUNKS]
             self._snapshot_ns = None
 
-    def _take(self, key: SessionKey, standing: Standing, now_ns: int) -> Batch:
+    def _take(self, key: SessionKey, standing: RestartPoint, now_ns: int) -> Batch:
         """Return all that waits as one batch, of this very moment."""
         self._gather()
         cursor = standing.cursor

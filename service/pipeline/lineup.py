@@ -13,14 +13,18 @@ from service.errors import ParameterError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CounterChoice:
-    """A counter of the registry with a preset and overrides; called, it makes one. Checked when it is made."""
+    """A counter of the registry with a preset and overrides; called, it makes one.
+
+    Checked when it is made: overrides given as text are then the values that they say.
+    """
 
     name: str
     preset: str = "tuned"
     overrides: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        registry.parameters(self.name, self.preset, self.overrides)
+        checked = registry.parameters(self.name, self.preset, self.overrides)
+        object.__setattr__(self, "overrides", {key: getattr(checked, key) for key in self.overrides})
 
     def __call__(self) -> StepCounter:
         """Return a fresh counter."""

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from service.errors import LinkError
 from service.links.contract import Link
-from service.pipeline.journal import Journal, Standing
+from service.pipeline.journal import Journal, RestartPoint
 from service.pipeline.lifecycle import State
 from service.pipeline.lineup import Lineup
 from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told, entry_of
@@ -49,8 +49,9 @@ ANSWER_S: Final = 10.0
 REFUSED_S: Final = 2.0
 """Wait after a request that was refused."""
 ORDINALS_SKIPPED: Final = 1000
+"""Numbers left out after a restart: before a crash as many may have been told that were not yet on the disk …"""
 EVENTS_PER_S: Final = 40
-"""Numbers left out after a restart: before a crash as many may have been told that were not yet on the disk."""
+"""… and so many more for each second since the last snapshot, however long the disk took nothing."""
 
 TELL_EVERY_NS: Final = 1_000_000_000
 """While packets come, the device's description (packets, losses, signal) is told so often."""
@@ -261,8 +262,8 @@ class Session:
             self.after = last
         self.journal.begin(SessionKey(device=device, since_ns=self.since_ns))
 
-    def _standing(self) -> Standing:
-        return Standing(cursor=self._cursor(), state=self._state, about=self._about())
+    def _standing(self) -> RestartPoint:
+        return RestartPoint(cursor=self._cursor(), state=self._state, about=self._about())
 
     def _cursor(self) -> Cursor:
         run, boot, index = self.tracker.cursor

@@ -94,6 +94,7 @@ class Supervisor:
     def disconnect(self, key: str) -> Device:
         """Close a device's link, and leave it alone until it is wanted again."""
         device = self.device(key)
+        device.spared = False
         if device.wanted:
             device.unwant()
         return device
@@ -133,7 +134,13 @@ class Supervisor:
                 self._tasks = None
                 for task in own:
                     task.cancel()
-                await asyncio.gather(*(device.close() for device in self._roster.devices), return_exceptions=True)
+                await asyncio.gather(*(self._close(device) for device in self._roster.devices))
+
+    async def _close(self, device: Device) -> None:
+        try:
+            await device.close()
+        except Exception:  # what is wrong with one must not keep the others from being stored
+            logger.exception("closing %s", device.id)
 
     def _take_up(self, device: Device) -> None:
         """Go on with a stored session; its device is left alone where it was, or where others only are wanted now."""

@@ -22,9 +22,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, Final
 
-from service.errors import WireError
 from service.samples import Described, DeviceInfo, Event, Heard, Packet, RawBlock, Received, Reply
-from service.signals.rate import Rate
 from service.tracking.awaiting import awaited
 from service.tracking.behind import SLICE_SAMPLES, Behind
 from service.tracking.cutting import cut
@@ -33,6 +31,7 @@ from service.tracking.fitness import Stream
 from service.tracking.fold import CounterFactory, Fold
 from service.tracking.intake import Booted, Intake, Said
 from service.tracking.kept import Kept
+from service.tracking.readings import Readings
 from service.tracking.requests import Missing, Requests
 from service.tracking.tally import Tally
 from service.wearables.contract import Wearable
@@ -43,7 +42,7 @@ LATE_S: Final = 10.0
 """A live packet older than this fills no hole: its index is rather broken."""
 
 
-class BackfillTracker:
+class BackfillTracker(Readings):
     """Counts one device's steps, as a Tracker; nothing that can still come is counted without it."""
 
     def __init__(self, wearable: Wearable, counters: Mapping[str, CounterFactory], *, primary: str) -> None:
@@ -54,29 +53,8 @@ class BackfillTracker:
         self._requests = Requests()
 
     @property
-    def primary(self) -> str:
-        """The counter whose count is the device's."""
-        return self._committed.primary
-
-    @property
-    def info(self) -> DeviceInfo:
-        """What the device has said of itself."""
-        return self._intake.info
-
-    @property
-    def last_fault(self) -> WireError | None:
-        """What was wrong with the newest bad packet."""
-        return self._intake.last_fault
-
-    @property
-    def steps(self) -> dict[str, int]:
-        """Each counter's confirmed steps."""
-        return self._committed.steps
-
-    @property
-    def total(self) -> int:
-        """The device's confirmed steps; never falls."""
-        return self._committed.total
+    def _front(self) -> Fold:
+        return self._behind.front
 
     @property
     def steps_now(self) -> int:
@@ -84,34 +62,9 @@ class BackfillTracker:
         return self._behind.steps_now
 
     @property
-    def now_s(self) -> float:
-        """Device time of the newest sample counted, seconds after boot."""
-        return self._behind.front.now_s
-
-    @property
-    def cadence_spm(self) -> float | None:
-        """Steps a minute now; None while nobody walks."""
-        return self._behind.front.cadence_spm
-
-    @property
-    def measured_rate_hz(self) -> float | None:
-        """The rate that samples are placed by: the nominal one until the device's clock disproves it."""
-        return self._behind.front.measured_rate_hz
-
-    @property
-    def rate(self) -> Rate | None:
-        """The sampling rate as the device's clock tells it, and how well; None until this boot has told two ticks."""
-        return self._behind.front.rate
-
-    @property
-    def counter_faults(self) -> dict[str, str]:
-        """Why a counter does not count now, as a sentence."""
-        return self._behind.front.counter_faults
-
-    @property
     def stream(self) -> Stream:
         """What is known of what the device sends."""
-        return dataclasses.replace(self._behind.front.stream, has=self.info.sensors)
+        return dataclasses.replace(self._front.stream, has=self.info.sensors)
 
     @property
     def cursor(self) -> tuple[int, int, int]:

@@ -12,16 +12,16 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from service.errors import WireError
-from service.samples import Described, DeviceInfo, Event, Packet, RawBlock
+from service.samples import Described, Event, Packet, RawBlock
 from service.tracking.fitness import Stream
 from service.tracking.fold import CounterFactory, Fold
 from service.tracking.intake import Booted, Intake, Said
+from service.tracking.readings import Readings
 from service.tracking.tally import Tally
 from service.wearables.contract import Wearable
 
 
-class Tracker:
+class Tracker(Readings):
     """Counts one device's steps.
 
     `counters` makes each counter by name; `primary` names the one whose count is the device's `steps`.
@@ -30,62 +30,17 @@ class Tracker:
     def __init__(self, wearable: Wearable, counters: Mapping[str, CounterFactory], *, primary: str) -> None:
         self.tally = Tally()
         self._intake = Intake(wearable, self.tally)
-        self._fold = Fold(counters, primary=primary, tally=self.tally)
-
-    @property
-    def primary(self) -> str:
-        """The counter whose count is the device's."""
-        return self._fold.primary
-
-    @property
-    def info(self) -> DeviceInfo:
-        """What the device has said of itself."""
-        return self._intake.info
-
-    @property
-    def last_fault(self) -> WireError | None:
-        """What was wrong with the newest bad packet."""
-        return self._intake.last_fault
-
-    @property
-    def steps(self) -> dict[str, int]:
-        """Each counter's confirmed steps."""
-        return self._fold.steps
+        self._committed = Fold(counters, primary=primary, tally=self.tally)
 
     @property
     def steps_now(self) -> int:
         """The device's steps with what is pending; may fall."""
-        return self._fold.steps_now
-
-    @property
-    def counter_faults(self) -> dict[str, str]:
-        """Why a counter does not count, as a sentence."""
-        return self._fold.counter_faults
-
-    @property
-    def now_s(self) -> float:
-        """Device time of the newest sample, seconds after boot."""
-        return self._fold.now_s
-
-    @property
-    def total(self) -> int:
-        """The device's confirmed steps: the primary's of each segment, added up; never falls."""
-        return self._fold.total
-
-    @property
-    def cadence_spm(self) -> float | None:
-        """Steps a minute now; None while nobody walks."""
-        return self._fold.cadence_spm
-
-    @property
-    def measured_rate_hz(self) -> float | None:
-        """The device's sampling rate as its own clock tells it."""
-        return self._fold.measured_rate_hz
+        return self._committed.steps_now
 
     @property
     def stream(self) -> Stream:
         """What is known of what the device sends."""
-        return self._fold.stream
+        return self._committed.stream
 
     def apply(self, packet: Packet) -> list[Event]:
         """Take one packet; return what it tells. Never raises for what a device sends."""
@@ -94,43 +49,43 @@ class Tracker:
             if isinstance(item, RawBlock):
                 events += self._count(item)
             elif isinstance(item, Booted):
-                events += self._fold.begin_boot(item.boot)
+                events += self._committed.begin_boot(item.boot)
             elif isinstance(item, Said):
-                self._fold.describe(item.info)
+                self._committed.describe(item.info)
                 if item.is_change:
                     events.append(Described(info=self.info))
         return events
 
     def change_counters(self, counters: Mapping[str, CounterFactory], *, primary: str) -> list[Event]:
         """Go on with other counters, as Fold.change_counters."""
-        return self._fold.change_counters(counters, primary=primary)
+        return self._committed.change_counters(counters, primary=primary)
 
     def finish(self) -> list[Event]:
         """End the stream: decide what is still pending."""
-        return self._fold.finish()
+        return self._committed.finish()
 
     def snapshot(self) -> dict[str, Any]:
         """Return the whole state as plain data."""
         return {
-            **self._fold.snapshot(),
+            **self._committed.snapshot(),
             "tally": dataclasses.asdict(self.tally),
             "intake": self._intake.snapshot(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take over a snapshot's state; SnapshotError where its counters are not ours."""
-        fold = self._fold
+        fold = self._committed
         fold.restore(state)
         self._intake.restore(state["intake"], run=fold.run, boot=fold.boot, next_index=fold.next_index)
         for field in dataclasses.fields(Tally):
             setattr(self.tally, field.name, state["tally"][field.name])
 
     def _count(self, block: RawBlock) -> list[Event]:
-        awaited = self._fold.next_index
+        awaited = self._committed.next_index
         fresh = len(block) if awaited is None else min(len(block), block.index + len(block) - awaited)
         if fresh <= 0:
             self.tally.packets_duplicate += 1
             return []
         self.tally.samples += fresh
         self.tally.samples_saturated += sum(at >= len(block) - fresh for at in block.saturated)
-        return self._fold.count(block)
+        return self._committed.count(block)

@@ -109,3 +109,9 @@ async def test_the_feed_tells_steps_of_the_counters_asked_for(walk):
             await feed.recv()
     assert closed.value.rcvd.code == 4404
     assert "abacus" in closed.value.rcvd.reason
+
+
+async def test_a_parameter_sent_as_text_is_the_number_it_says(walk):
+    body = {"counters": [{"name": "double_threshold", "params": {"bout": "3", "window_mode": "fixed"}}]}
+    answer = (await walk.http.put("api/v1/devices/sim-1/counters", json=body)).json()
+    assert answer["counters"][0]["params"] == {"bout": 3, "window_mode": "fixed"}

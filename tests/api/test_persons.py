@@ -1,6 +1,7 @@
 """Whose data are whose: owners, and the deletion of all that is a person's."""
 
 import asyncio
+import sqlite3
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ from device_sim.bracelet import Bracelet
 from device_sim.source import WalkerSource
 
 PERSON = "api/v1/devices/sim-1/person"
+OWNERS = "SELECT since_ns, name FROM sessions JOIN persons ON persons.id = sessions.person ORDER BY since_ns"
 
 
 def walking():
@@ -25,14 +27,17 @@ async def test_a_persons_data_are_gone_for_good_and_the_device_is_left_alone(tmp
         await stage.until(lambda device: device["steps"] > 10)
         answer = await stage.http.put(PERSON, json={"person": "Anna-Lena"})
         assert answer.status_code == 204, answer.text
+        walk = {"counter": "double_threshold", "method": "walk", "pace": "normal", "seconds": 60}
+        begun = await stage.http.post("api/v1/devices/sim-1/calibrations", json=walk)
+        assert begun.status_code == 201, begun.text
         await asyncio.sleep(1.5)
         assert b"Anna-Lena" in b"".join(file.read_bytes() for file in path.parent.glob("s.db*"))
         answer = await stage.http.delete("api/v1/persons/Anna-Lena")
         assert (answer.status_code, answer.json()) == (200, {"sessions": 1})
         device = await stage.device()
         assert (device["state"], device["steps"], device["samples"]) == ("disconnected", 0, 0)
-        steps = await stage.http.get("api/v1/devices/sim-1/steps")
-        assert steps.json()["items"] == [] if steps.status_code == 200 else steps.status_code == 404
+        for kept in ("steps?session=all", "calibrations"):
+            assert (await stage.http.get(f"api/v1/devices/sim-1/{kept}")).json()["items"] == []
         assert b"Anna-Lena" not in b"".join(file.read_bytes() for file in path.parent.glob("s.db*"))
         again = await stage.http.delete("api/v1/persons/Anna-Lena")
         assert again.status_code == 404
@@ -55,6 +60,14 @@ async def test_another_person_gets_a_session_of_their_own(tmp_path):
         await stage.until(lambda device: device["steps"] > 2)
         own = (await stage.http.get("api/v1/devices/sim-1/steps")).json()["items"]
         assert own[0]["steps"] == 1
+        owners = {}
+        async with asyncio.timeout(5):
+            while len(owners) < 2:
+                await asyncio.sleep(0.1)
+                with sqlite3.connect(tmp_path / "s.db") as database:
+                    owners = dict(database.execute(OWNERS).fetchall())
+                database.close()
+        assert list(owners.values()) == ["P1", "P2"]
         every = (await stage.http.get("api/v1/devices/sim-1/steps?session=all&limit=1000")).json()["items"]
         assert len(every) > len(own) + 9
         answer = await stage.http.delete("api/v1/persons/P1")

@@ -17,6 +17,7 @@ from device_sim.air import LocalAir
 from device_sim.bracelet import Bracelet, quantise
 from device_sim.gait import Walker
 from service.counters.registry import DEFAULT
+from service.errors import StoreError, StoreFault
 from service.pipeline import journal
 from service.samples import Packet
 from service.store import database
@@ -199,3 +200,17 @@ async def test_more_waits_than_there_is_room_for_and_the_count_is_right_after_a_
     assert steps == undisturbed(first, end)
     assert end == session.cursor.index
     assert (len(raw.values) < session.cursor.index - first) == (held == "HELD_CHUNKS")
+
+
+async def test_a_database_that_cannot_be_read_is_a_503_for_now(tmp_path, monkeypatch):
+    async with walking() as air, serving(air, path=tmp_path / "s.db") as stage:
+        await stage.until(lambda device: device["steps"] > 5)
+
+        def unreadable(_reader, _query):
+            raise StoreError(StoreFault.LOCKED, "another program holds s.db: end it")
+
+        monkeypatch.setattr(Reader, "log", unreadable)
+        answer = await stage.http.get(f"api/v1/{STEPS}")
+        assert (answer.status_code, answer.json()) == (503, {"detail": "another program holds s.db: end it"})
+        monkeypatch.undo()
+        assert (await stage.http.get(f"api/v1/{STEPS}")).status_code == 200

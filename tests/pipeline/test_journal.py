@@ -6,7 +6,7 @@ import time
 import pytest
 
 from service.errors import StoreError, StoreFault
-from service.pipeline.journal import HELD_CHUNKS, Journal, Standing
+from service.pipeline.journal import HELD_CHUNKS, Journal, RestartPoint
 from service.samples import DeviceInfo, RawBlock, Received
 from service.store.values import Cursor, LogEntry, LogPage, LogQuery, Note, SessionKey
 
@@ -51,7 +51,7 @@ def second(made, k):
 
 
 def standing(index=50):
-    return Standing(cursor=Cursor(run=0, boot=1, index=index), state=lambda: {"index": index}, about={"name": "b"})
+    return RestartPoint(cursor=Cursor(run=0, boot=1, index=index), state=lambda: {"index": index}, about={"name": "b"})
 
 
 async def test_samples_events_and_their_place_are_one_batch():

@@ -70,3 +70,34 @@ async def test_a_session_that_cannot_go_on_ends_and_the_next_is_numbered_on(tmp_
         assert anew["steps"] < len(page["items"])
         ordinals = [item["ordinal"] for item in page["items"]]
         assert ordinals == sorted(set(ordinals))
+
+
+async def test_a_disconnect_holds_where_an_option_left_the_device_alone_already(tmp_path):
+    path = tmp_path / "s.db"
+    async with LocalAir() as air, air.bracelet(Bracelet(WalkerSource("normal:600", seed=3)), speed=8):
+        async with serving(air, path=path) as stage:
+            await stage.until(lambda device: device["steps"] > 5)
+        async with serving(air, path=path, wanted=["another"]) as stage:
+            await stage.http.post("api/v1/devices/sim-1/disconnect")
+            await asyncio.sleep(1.5)
+        async with serving(air, path=path) as stage:
+            await asyncio.sleep(1)
+            assert (await stage.device())["state"] == "disconnected"
+
+
+async def test_pages_go_on_over_a_restart(tmp_path):
+    path, page = tmp_path / "s.db", "api/v1/devices/sim-1/steps?limit=7"
+    bracelet = Bracelet(WalkerSource("normal:600", seed=3))
+    async with LocalAir() as air, air.bracelet(bracelet, speed=8):
+        async with serving(air, path=path) as stage:
+            await stage.until(lambda device: device["steps"] > 20)
+            first = (await stage.http.get(page)).json()
+            assert [item["steps"] for item in first["items"]] == list(range(1, 8))
+        async with serving(air, path=path) as stage:
+            counted, after = [], first["next"]
+            await stage.until(lambda device: device["steps"] > 40)
+            while after is not None and len(counted) < 34:
+                following = (await stage.http.get(f"{page}&after={after}")).json()
+                counted += [item["steps"] for item in following["items"]]
+                after = following["next"]
+    assert counted[:33] == list(range(8, 41))

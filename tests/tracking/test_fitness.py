@@ -100,7 +100,7 @@ def test_what_the_device_has_but_does_not_send_is_a_fault_and_the_stream_goes_on
 
 def test_a_counter_goes_on_as_after_a_gap_when_its_sensor_comes_back():
     tracker = beside("turning", sensors=(A, G))
-    made = tracker._fold._counters["turning"]
+    made = tracker._committed._counters["turning"]
     run(tracker, data_packets([10] * 4, sensors=(A, G)))
     assert (tracker.total, tracker.steps_now) == (2, 3)
     events = run(tracker, data_packets([10] * 6, start=40))
