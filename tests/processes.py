@@ -16,7 +16,8 @@ START_S = 30.0
 """Longest time a process may take to say that it runs, on a busy machine."""
 
 
-def free_port():
+def free_port() -> int:
+    """A port of this machine that nobody listens on."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]

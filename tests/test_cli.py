@@ -12,6 +12,7 @@ from contextlib import contextmanager
 import httpx
 import numpy as np
 import pytest
+from processes import free_port
 
 from service.cli import main
 
@@ -21,12 +22,6 @@ ENDS_WITHIN_S = 2.0
 def environment():
     """As this process, but with no Bluetooth daemon to be found."""
     return {**os.environ, "DBUS_SYSTEM_BUS_ADDRESS": "unix:path=/nonexistent", "PYTHONUNBUFFERED": "1"}
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def run(*words, timeout=20):

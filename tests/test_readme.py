@@ -1,7 +1,6 @@
 """The README's first command, as a newcomer runs it: a fresh clone, a new environment, steps on the first page."""
 
 import signal
-import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+from processes import free_port
 from test_project import ROOT, START
 
 pytestmark = pytest.mark.full
@@ -31,12 +31,6 @@ def clone(tmp_path_factory) -> Path:
     assert demo == ".venv/bin/steplink demo"
     subprocess.run(" && ".join(install), shell=True, cwd=folder, check=True, timeout=600)
     return folder
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """The page on the real service: steps appear as they happen, and what is lost comes back."""
 
-import socket
 from collections.abc import Iterator
 
 import pytest
@@ -8,6 +7,7 @@ from browser.commands import running
 from browser.test_page import field
 from browser.test_plot import clusters, columns
 from playwright.sync_api import Browser, Page, expect
+from processes import free_port
 
 URL = r"http://\S+/"
 PICTURE = "document.querySelector('canvas').toDataURL()"
@@ -31,13 +31,6 @@ def wait_for_steps(page: Page, steps: int) -> None:
         arg=steps,
         timeout=40_000,
     )
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def test_steps_appear_as_they_happen(page: Page) -> None:
