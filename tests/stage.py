@@ -39,6 +39,8 @@ class Stage:
         return self.url.replace("http", "ws", 1) + "api/v1/live"
 
     def live(self, query="", **options):
+        """The feed. A client with messages that nobody reads hears no close, and would wait for ten seconds."""
+        options = {"close_timeout": 1} | options
         return websockets.connect(self.live_url + query, max_size=None, proxy=None, **options)
 
     async def device(self, key="sim-1"):

@@ -76,6 +76,7 @@ async def storm(seed, rounds):
         assert await delivers(backend, found[0])
 
 
+@pytest.mark.full
 async def test_a_short_storm_ends_in_a_working_link():
     await storm(seed=1, rounds=6)
 

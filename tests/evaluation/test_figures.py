@@ -70,6 +70,7 @@ def seen(monkeypatch):
     return kept
 
 
+@pytest.mark.full
 def test_every_figure_is_written_once_and_is_no_blank(tmp_path, seen, monkeypatch):
     monkeypatch.setattr(canvas, "DPI", 50)
     written = draw.write(canvas.checked_folder(str(tmp_path / "new")), ROWS, [], lsb_per_g=32.0)
