@@ -140,6 +140,7 @@ def test_a_bracelet_in_one_terminal_and_the_service_in_another():
         ends_cleanly(serve, signal.SIGINT)
 
 
+@pytest.mark.full
 def test_scan_lists_what_is_near():
     air = f"127.0.0.1:{free_port()}"
     with running("sim", "--air", air, "--name", "Wrist") as sim:
@@ -159,6 +160,7 @@ def test_scan_and_sim_end_on_ctrl_c_before_anything_came():
             ends_cleanly(scan, signal.SIGINT)
 
 
+@pytest.mark.full
 def test_playing_a_recording_once_ends_by_itself(tmp_path):
     path = tmp_path / "still.csv"
     path.write_text("time_s,x_g,y_g,z_g\n" + "".join(f"{i / 50},0,0,1\n" for i in range(50)))

@@ -91,6 +91,7 @@ def test_a_long_block_equals_packets(make, signal, samples):
 
 @settings(max_examples=4, deadline=None)
 @given(signal=signals(), samples=st.integers(2100, 6000))
+@pytest.mark.full
 def test_a_long_block_of_the_default_counter_equals_packets(signal, samples):
     conformance.check_long_block(partial(registry.make, registry.DEFAULT), signal, samples)
 

@@ -87,6 +87,7 @@ async def _stream(radio, backends, device):
         await host.client.disconnect()
 
 
+@pytest.mark.full
 async def test_a_short_storm_of_cancels_leaves_no_link(radio, stage, caplog):
     await storm(radio, stage, caplog, seed=2, rounds=30)
 

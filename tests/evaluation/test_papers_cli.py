@@ -65,6 +65,7 @@ def test_a_paper_needs_no_recording_and_takes_the_published_parameters(tmp_path,
 
 
 @pytest.mark.usefixtures("short")
+@pytest.mark.full
 def test_the_preset_can_be_chosen_and_the_figures_drawn(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("service.evaluation.figures.canvas.DPI", 30)
     folder = tmp_path / "drawn"

@@ -304,7 +304,7 @@ def test_what_was_learnt_keeps_other_overrides_and_runs_beside_where_the_counter
         ("double_threshold", "paper", {"first_window": 27}),
     ]
     again = lineup("double_threshold", params=["double_threshold.bout=3"]).taught("double_threshold", {"valleys": 1})
-    assert again.choices[0].overrides == {"bout": "3", "valleys": 1}
+    assert again.choices[0].overrides == {"bout": 3, "valleys": 1}
 
 
 def test_only_done_ones_of_one_kind_are_applied():
