@@ -126,13 +126,38 @@ Likely = tuple[float, float, bool]
 """A step that may come: device time, strength, whether it passes what is in force. Confirmed, it has the same time."""
 
 
+class Verdict(StrEnum):
+    """What a counter that recognises walking makes of the motion it was given."""
+
+    REST = "rest"
+    """Hardly any motion."""
+    OTHER = "other"
+    """Motion that is no walking: its peaks are refused."""
+    PERHAPS = "perhaps"
+    """It may be walking and is not certain yet: its steps wait, and are credited in retrospect or refused."""
+    WALKING = "walking"
+
+
+class Gait(NamedTuple):
+    """Whether somebody walks, as of device time `at_s`: a little before the newest sample.
+
+    `confidence` is the probability of walking, 0 to 1; `cadence_hz` is in steps a second, None unless walking.
+    """
+
+    at_s: float
+    verdict: Verdict
+    confidence: float
+    cadence_hz: float | None
+
+
 class Update(NamedTuple):
     """What a counter says after a block: steps now certain, how many more are likely, and its view for the plot.
 
     `likely` names every peak that can still become a step, where the counter can tell them apart; one it names no more
     and has not confirmed is retracted. `pending` counts those of them that pass what is in force. `trace` holds the
-    filtered signal, one value a sample of the block, the first at device time `trace_from_s`. A tuple, since one is
-    made a packet and counter, and a frozen dataclass takes twice as long to make.
+    filtered signal, one value a sample of the block, the first at device time `trace_from_s`. `gait` is the newest of a
+    counter that recognises walking, None of any other. A tuple, since one is made a packet and counter, and a frozen
+    dataclass takes twice as long to make.
     """
 
     steps: tuple[Step, ...] = ()
@@ -141,6 +166,7 @@ class Update(NamedTuple):
     trace_from_s: float = 0.0
     trace: Sequence[float] = ()
     bands: tuple[Band, ...] = ()
+    gait: Gait | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -322,12 +348,16 @@ class Signal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counting:
-    """Ephemeral: both counts and cadence; `now_s` is the device time of the newest sample."""
+    """Ephemeral: both counts and cadence; `now_s` is the device time of the newest sample.
+
+    `gait` is what the primary makes of the motion, None where it does not recognise walking.
+    """
 
     now_s: float
     steps: int
     steps_now: int
     cadence_spm: float | None
+    gait: Gait | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
