@@ -13,10 +13,13 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Collection, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from service.errors import ParameterError, SnapshotError
-from service.samples import SampleBlock, Sensor, Update
+from service.samples import SampleBlock, Sensor, Step, Update
 
 Snapshot = dict[str, Any]
 """Plain data (JSON-able): the counter's name, version, a hash of its parameters and its state."""
@@ -52,6 +55,17 @@ class StepCounter(Protocol):
 
     def restore(self, state: Snapshot) -> None:
         """Take over a snapshot's state; SnapshotError where it is another counter's."""
+
+
+@runtime_checkable
+class RecordingCounter(StepCounter, Protocol):
+    """A counter that can also count a whole recording at once, faster and to the same steps."""
+
+    def count(self, block: SampleBlock) -> NDArray[np.float64]:
+        """Count `block` from a fresh state, as `update` and `finish` would; return a row a step."""
+
+    def read(self, rows: NDArray[np.float64]) -> tuple[Step, ...]:
+        """Return the steps that `count`'s rows say."""
 
 
 def lacking(name: str, needed: Collection[Sensor], has: Collection[Sensor]) -> str | None:

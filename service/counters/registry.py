@@ -18,6 +18,7 @@ from service.counters import (
     fusion,
     gyro_zero_crossing,
     plus_minus,
+    steplink,
 )
 from service.counters.contract import StepCounter, lacking, with_overrides
 from service.counters.learning import MIDDLE, SLOWEST_WALK, WALK, Method
@@ -71,6 +72,7 @@ def _kind(
 
 
 _KINDS: Final = (
+    _kind("steplink", steplink.build, paper=steplink.TUNED, tuned=steplink.TUNED, sensors=ACCELEROMETER),
     _kind(
         "double_threshold",
         double_threshold.build,

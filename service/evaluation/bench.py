@@ -21,8 +21,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from service.counters import registry
-from service.counters.contract import StepCounter
-from service.counters.streaming import KernelCounter
+from service.counters.contract import RecordingCounter, StepCounter
 from service.evaluation import yardsticks
 from service.evaluation.counting import grid_block, pieces, streamed
 from service.recordings import read
@@ -131,7 +130,7 @@ def _ratio(name: str, theirs_s: float, ours_s: float) -> Figure:
 
 def _count_fast(name: str, block: SampleBlock) -> object:
     counter = registry.make(name)
-    return counter.count(block) if isinstance(counter, KernelCounter) else streamed(counter, [block])
+    return counter.count(block) if isinstance(counter, RecordingCounter) else streamed(counter, [block])
 
 
 def _count_plain(name: str, parts: Iterable[SampleBlock]) -> object:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.counters import registry
-from service.counters.contract import StepCounter, params_hash
-from service.counters.streaming import COMPILED_FROM, KernelCounter
+from service.counters.contract import RecordingCounter, StepCounter
+from service.counters.streaming import COMPILED_FROM
 from service.errors import RecordingError
 from service.recordings import Recording, evenly_spaced, stated_rate_hz
 from service.recordings.recording import Floats, median_rate_hz
@@ -101,7 +101,7 @@ def count(
     """
     block = recording if isinstance(recording, SampleBlock) else grid_block(recording)
     made = registry.make(counter, preset, overrides, sensors(block))
-    if isinstance(made, KernelCounter) and (available() if fast is None else fast):
+    if isinstance(made, RecordingCounter) and (available() if fast is None else fast):
         _compile_once(made, block, registry.make(counter, preset, overrides))
         began_s = time.perf_counter()
         rows = made.count(block)
@@ -119,9 +119,9 @@ _compiled: set[tuple[str, str]] = set()
 """Counters this process has compiled, by name and parameters."""
 
 
-def _compile_once(made: KernelCounter, block: SampleBlock, spare: StepCounter) -> None:
-    key = (made.name, params_hash(made.params))
-    if key not in _compiled and isinstance(spare, KernelCounter):
+def _compile_once(made: RecordingCounter, block: SampleBlock, spare: StepCounter) -> None:
+    key = (made.name, made.snapshot()["params"])
+    if key not in _compiled and isinstance(spare, RecordingCounter):
         spare.count(part(block, 0, WARM_UP_SAMPLES, as_lists=False))
         _compiled.add(key)
 

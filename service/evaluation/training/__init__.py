@@ -1,0 +1,1 @@
+"""How the weights of steplink's own counter are learnt: material, clips, network, fit, cross-validation, model card."""

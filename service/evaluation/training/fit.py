@@ -1,0 +1,68 @@
+"""Fitting the network: AdamW with one cycle of the learning rate, plain floats first, then as the integers it ships as.
+
+Everything follows from the seed: material, clips and weights, on the same machine and versions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any, Final
+
+import jax
+import numpy as np
+import optax
+from numpy.typing import NDArray
+
+from service.evaluation.training import model
+from service.evaluation.training.clips import Clip, Sampler
+
+BATCH: Final = 24
+STEPS: Final = 1500
+HIGHEST_RATE: Final = 4e-3
+DECAY: Final = 1e-3
+EXACT_FROM: Final = 0.5
+"""Share of the steps after which rounding begins."""
+FIELDS: Final = tuple(Clip.__dataclass_fields__)
+
+Told = Callable[[int, float], None]
+
+
+def fit(
+    sampler: Sampler,
+    *,
+    steps: int = STEPS,
+    seed: int = 1,
+    start: dict[str, NDArray[Any]] | None = None,
+    rate: float = HIGHEST_RATE,
+    told: Told = lambda _step, _loss: None,
+) -> model.Params:
+    """Return fitted weights in plain units; `told` hears of each step's loss."""
+    params = model.fresh(seed) if start is None else start
+    schedule = optax.cosine_onecycle_schedule(steps, rate, pct_start=0.2)
+    optimiser = optax.chain(optax.clip_by_global_norm(1.0), optax.adamw(schedule, weight_decay=DECAY))
+    state = optimiser.init(params)
+    advance = {exact: jax.jit(partial(_advance, optimiser, exact)) for exact in (False, True)}
+    key = jax.random.PRNGKey(seed)
+    for number, clips in enumerate(batches(sampler, steps)):
+        key, now = jax.random.split(key)
+        params, state, value = advance[number >= EXACT_FROM * steps](params, state, clips, now)
+        told(number + 1, float(value))
+    return params
+
+
+def _advance(optimiser: Any, exact: bool, params: Any, state: Any, clips: Any, key: Any) -> Any:  # noqa: ANN401
+    value, slope = jax.value_and_grad(partial(model.loss, exact=exact))(params, clips, key)
+    change, state = optimiser.update(slope, state, params)
+    return optax.apply_updates(params, change), state, value
+
+
+def batches(sampler: Sampler, steps: int, batch: int = BATCH) -> Iterator[dict[str, NDArray[np.float32]]]:
+    """Yield batches of clips."""
+    for _ in range(steps):
+        yield stacked([sampler.clip() for _ in range(batch)])
+
+
+def stacked(clips: Sequence[Clip]) -> dict[str, NDArray[np.float32]]:
+    """Return clips as one batch."""
+    return {name: np.stack([getattr(clip, name) for clip in clips]) for name in FIELDS}

@@ -1,0 +1,146 @@
+"""What the network learns from: recordings on the 50 Hz grid with what is known of their steps, and synthetic walks.
+
+Three kinds of truth: the time of each step, their number alone, or that there are none. Where the quality is B the
+truth is approximate, and weighs less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.evaluation.choices import Found
+from service.evaluation.counting import grid_block
+from service.recordings import read
+from service.recordings.recording import Recording
+from service.samples import GRID_HZ
+
+UNSTATED: Final = frozenset({"eth2023_wrist", "eth2022_wrist", "brajdic_walk", "brajdic_handling", "voisard_lowback"})
+"""Sets whose licence is not stated, or does not suit: they measure, and teach nothing."""
+
+SYNTHETIC: Final = "device_sim"
+"""The source of synthetic walks."""
+
+WALKS: Final = (
+    "rest:6,normal:25,rest:4,slow:25,rest:5,fast:20,gesture:8",
+    "rest:5,run:30,rest:8,normal:12,rest:6,stairs_up:15,stairs_down:15",
+    "type:10,still_arm:30,rest:6,pocket:30,rest:4",
+    "brush:20,rest:4,normal:8,wave:12,rest:3,slow:30",
+    "rest:5,uphill:20,downhill:20,knock:8,rest:5,normal:6,rest:8,normal:6",
+    "sit:8,rest:6,stand:8,slow:20,normal:20,fast:20,run:10",
+)
+"""What the synthetic wearers do, in seconds each."""
+
+DOUBTFUL_S: Final = 30.0
+"""A step that hides in a recording of quality B without steps weighs in a shorter one."""
+
+WEIGHTS: Final = {
+    "pebble_wrist/walk": 0.24,
+    "banglejs_walk/walk": 0.08,
+    "oxford_opt/walk": 0.28,
+    "dcaiti/walk": 0.04,
+    "negatives_spar_watch/still": 0.12,
+    "negatives_hmp/still": 0.13,
+    "negatives_hmp/doubt": 0.03,
+    "negatives_banglejs/still": 0.05,
+    "pebble_wrist/still": 0.08,
+    "device_sim/walk": 0.05,
+}
+"""How often a piece of a clip is of a pool: half of the walks of the wrist, and all that was hard to refuse often."""
+
+OTHERS: Final = 0.05
+"""Of a pool not named there: somebody's own recordings."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Material:
+    """One recording: acceleration n × 3 in g on the grid, and its truth.
+
+    `step_s` are the steps' times in seconds after the first sample, None where only their number is known.
+    """
+
+    source: str
+    subject: str
+    placement: str
+    activity: str
+    acc_g: Floats
+    true_steps: int
+    step_s: Floats | None = None
+    trusted: bool = True
+
+    @property
+    def duration_s(self) -> float:
+        """Length in seconds."""
+        return len(self.acc_g) / GRID_HZ
+
+    @property
+    def at_wrist(self) -> bool:
+        """Whether it was worn at a wrist."""
+        return self.placement.startswith("wrist")
+
+
+def load(found: Sequence[Found]) -> list[Material]:
+    """Read recordings and put them on the grid; those without a true number of steps teach nothing and are left out."""
+    read_all = ((file, read(file.path)) for file in found)
+    return [material(file.dataset, recording) for file, recording in read_all if _true(recording) is not None]
+
+
+def material(source: str, recording: Recording) -> Material:
+    """Return one recording as material; its true number of steps is known."""
+    true = _true(recording)
+    assert true is not None  # noqa: S101  # the caller has looked
+    doubtful = recording.quality == "B" and not true and recording.duration_s < DOUBTFUL_S
+    times = recording.step_t_s
+    return Material(
+        source=source,
+        subject=recording.subject or recording.path.stem,
+        placement=recording.placement or "unknown",
+        activity=recording.activity or "unknown",
+        acc_g=np.column_stack([np.asarray(column) for column in grid_block(recording).acc_g]),
+        true_steps=true,
+        step_s=None if times is None or not len(times) else times - recording.t_s[0],
+        trusted=not doubtful,
+    )
+
+
+def _true(recording: Recording) -> int | None:
+    if recording.true_steps is None and recording.step_t_s is not None:
+        return len(recording.step_t_s)
+    return recording.true_steps
+
+
+def synthetic(wearers: int, *, seed: int) -> list[Material]:
+    """Return synthetic walks of as many wearers, at the wrist, with the time of every step."""
+    from device_sim.gait import Walker  # noqa: PLC0415
+
+    made = []
+    for number in range(wearers):
+        rng = np.random.default_rng([seed, number])
+        walker = Walker(
+            WALKS[number % len(WALKS)],
+            seed=int(rng.integers(2**31)),
+            strength=float(rng.uniform(0.5, 1.4)),
+            arm_m=float(rng.uniform(0.3, 0.7)),
+            noise_g=float(rng.uniform(0.002, 0.02)),
+        )
+        samples = round(walker.duration_s * GRID_HZ)
+        acc_g = np.asarray(walker.read(samples), dtype=np.float64)
+        step_s = np.asarray(walker.step_times_until(walker.duration_s))
+        made.append(
+            Material(
+                source=SYNTHETIC,
+                subject=f"walker {number}",
+                placement="wrist",
+                activity="schedule",
+                acc_g=acc_g,
+                true_steps=len(step_s),
+                step_s=step_s,
+            )
+        )
+    return made
