@@ -37,6 +37,12 @@ ACCEPTED: Final = 0.3
 
 Floats = NDArray[np.float64]
 
+TRANSFORM: Final = 256
+"""Values of the Fourier transform: more than WINDOW + LAGS, so that nothing wraps around."""
+
+_PERIODS: Final = np.concatenate((1.0 / FACTORS, 2.0 / FACTORS, 2.0 / FACTORS))
+"""Lags of r_m(T), r_m(2T), r_t(2T), as shares of the rough period; and where each correlation begins."""
+_FIRST: Final = np.repeat((0, 0, LAGS), len(FACTORS))
 _UNBIASED: Final = WINDOW / (WINDOW - np.arange(LAGS, dtype=np.float64))
 
 
@@ -45,37 +51,40 @@ def cadence_hz(z: float) -> float:
     return SLOWEST_HZ + SPAN_HZ / (1.0 + exp(0.5 - z * LOGIT))
 
 
-def windows(rows: Floats) -> Floats:
-    """Return frames × WINDOW × COLUMNS; `rows` begin WINDOW − FRAME_ROWS rows before the first frame does."""
-    frames = (len(rows) - WINDOW) // FRAME_ROWS + 1
-    by_row, by_column = rows.strides
+def windows(columns: Floats) -> Floats:
+    """Return frames × COLUMNS × WINDOW; `columns` begin WINDOW − FRAME_ROWS rows before the first frame does."""
+    frames = (columns.shape[1] - WINDOW) // FRAME_ROWS + 1
+    by_column, by_row = columns.strides
     return np.lib.stride_tricks.as_strided(
-        rows, (frames, WINDOW, COLUMNS), (by_row * FRAME_ROWS, by_row, by_column), writeable=False
+        columns, (frames, COLUMNS, WINDOW), (by_row * FRAME_ROWS, by_column, by_row), writeable=False
     )
 
 
 def correlations(seen: Floats) -> Floats:
-    """Return frames × 2 × LAGS of r_m and r_t for frames × WINDOW × COLUMNS integers."""
-    level = seen - np.rint(seen.sum(axis=1) / WINDOW)[:, None]
-    spectrum = np.fft.rfft(level, 2 * WINDOW, axis=1)
+    """Return frames × 2 × LAGS of r_m and r_t for frames × COLUMNS × WINDOW integers."""
+    level = seen - np.rint(seen.sum(axis=2) / WINDOW)[:, :, None]
+    spectrum = np.fft.rfft(level, TRANSFORM)
     power = spectrum.real * spectrum.real + spectrum.imag * spectrum.imag
-    both = np.stack((power[:, :, 0], power[:, :, 1] + power[:, :, 2] + power[:, :, 3]), axis=1)
-    sums = np.rint(np.fft.irfft(both, 2 * WINDOW)[:, :, :LAGS])
+    power[:, 1] += power[:, 2]
+    power[:, 1] += power[:, 3]
+    sums = np.rint(np.fft.irfft(power[:, :2], TRANSFORM)[:, :, :LAGS])
     ratio: Floats = sums / np.maximum(sums[:, :, :1], 1.0)
-    return ratio * _UNBIASED
+    ratio *= _UNBIASED
+    return ratio
 
 
 def refined_hz(rough_hz: Floats, r: Floats) -> Floats:
     """Return the cadence that `correlations` have near each frame's `rough_hz`; that itself where they have none."""
-    lag = ROWS_HZ / (rough_hz[:, None] * FACTORS)
-    lags = np.concatenate((lag, 2.0 * lag, 2.0 * lag), axis=1)
-    whole = np.minimum(lags.astype(np.intp), LAGS - 2)
-    first = np.repeat((0, 0, LAGS), len(FACTORS)) + 2 * LAGS * np.arange(len(r))[:, None]
-    flat, at = r.ravel(), first + whole
+    lags = (ROWS_HZ / rough_hz)[:, None] * _PERIODS
+    whole = np.minimum(lags, LAGS - 2.0).astype(np.intp)
+    at = whole + _FIRST
+    if len(r) > 1:
+        at += 2 * LAGS * np.arange(len(r))[:, None]
+    flat = r.ravel()
     before = flat[at]
-    values = np.where(lags < LAGS - 1, before + (flat[at + 1] - before) * (lags - whole), 0.0)
-    k = len(FACTORS)
-    s = (values[:, :k] + values[:, k : 2 * k] + values[:, 2 * k :]) / 3.0
-    best = np.argmax(s - COSTS, axis=1)
-    accepted = (best > 0) & (best < k - 1) & (s[np.arange(len(s)), best] > ACCEPTED)
+    values = before + (flat[at + 1] - before) * (lags - whole)
+    values[lags >= LAGS - 1] = 0.0
+    s = values.reshape(-1, 3, len(FACTORS)).sum(axis=1) / 3.0
+    best = (s - COSTS).argmax(axis=1)
+    accepted = (best > 0) & (best < len(FACTORS) - 1) & (s[np.arange(len(s)), best] > ACCEPTED)
     return np.where(accepted, rough_hz * FACTORS[best], rough_hz)

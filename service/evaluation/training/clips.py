@@ -108,7 +108,7 @@ class Sampler:
 
     def _add(self, made: _Label, one: Material) -> None:
         rng = self.rng
-        factor = float(np.exp(rng.uniform(np.log(0.78), np.log(1.28)))) if rng.random() < 0.8 else 1.0
+        factor, strength = motion.pace(rng)
         counted = one.step_s is None and one.true_steps > 0
         acc_g, step_s = one.acc_g, np.empty(0) if one.step_s is None else one.step_s
         number, weight = float(one.true_steps), 1.0 if one.trusted else 0.4
@@ -126,6 +126,8 @@ class Sampler:
                 step_s = step_s[inside] - begin / GRID_HZ
         if one.step_s is not None and one.source != SYNTHETIC and not one.at_wrist and rng.random() < 0.5:
             acc_g = motion.with_arm_swing(acc_g, step_s, rng)
+        if strength != 1.0:
+            acc_g = motion.strengthened(acc_g, strength)
         if factor != 1.0:
             acc_g, step_s = motion.stretched(acc_g, factor), step_s / factor
         acc_g = acc_g[: made.left()]

@@ -25,6 +25,9 @@ EXACT_FROM: Final = 0.5
 """Share of the steps after which rounding begins."""
 FIELDS: Final = tuple(Clip.__dataclass_fields__)
 
+AVERAGED: Final = 0.99
+"""Share of the running mean of the weights that stays at each step; the mean is what ships."""
+
 Told = Callable[[int, float], None]
 
 
@@ -42,13 +45,22 @@ def fit(
     schedule = optax.cosine_onecycle_schedule(steps, rate, pct_start=0.2)
     optimiser = optax.chain(optax.clip_by_global_norm(1.0), optax.adamw(schedule, weight_decay=DECAY))
     state = optimiser.init(params)
+    average = params
     advance = {exact: jax.jit(partial(_advance, optimiser, exact)) for exact in (False, True)}
     key = jax.random.PRNGKey(seed)
     for number, clips in enumerate(batches(sampler, steps)):
         key, now = jax.random.split(key)
         params, state, value = advance[number >= EXACT_FROM * steps](params, state, clips, now)
+        share = min(AVERAGED, number / (number + 10.0))
+        average = mean(average, params, share)
         told(number + 1, float(value))
-    return params
+    return average
+
+
+@jax.jit
+def mean(average: Any, params: Any, share: float) -> Any:  # noqa: ANN401
+    """Return the running mean of the weights."""
+    return jax.tree.map(lambda old, new: share * old + (1.0 - share) * new, average, params)
 
 
 def _advance(optimiser: Any, exact: bool, params: Any, state: Any, clips: Any, key: Any) -> Any:  # noqa: ANN401

@@ -27,6 +27,27 @@ def stretched(acc_g: Floats, factor: float) -> Floats:
     return _at(acc_g, np.linspace(0.0, n - 1, m))
 
 
+def pace(rng: Rng) -> tuple[float, float]:
+    """Return how much faster a motion is to be, and how much stronger: a walk becomes a slow one, a fast one or a run.
+
+    Most stay near what they were. What is much faster is stronger, as in a run, and what is much slower is weaker.
+    """
+    kind = rng.random()
+    if kind < 0.2:
+        return 1.0, 1.0
+    if kind < 0.72:
+        return float(np.exp(rng.uniform(np.log(0.78), np.log(1.28)))), 1.0
+    if kind < 0.84:
+        return rng.uniform(1.28, 1.7), rng.uniform(1.3, 3.0)
+    return rng.uniform(0.5, 0.78), rng.uniform(0.4, 1.0)
+
+
+def strengthened(acc_g: Floats, factor: float) -> Floats:
+    """Return it with all that is not its mean `factor` times as strong."""
+    mean = acc_g.mean(axis=0)
+    return np.asarray(mean + (acc_g - mean) * factor)
+
+
 def _at(acc_g: Floats, places: Floats) -> Floats:
     base = np.clip(places.astype(np.intp), 0, len(acc_g) - 2)
     part = (places - base)[:, None]
