@@ -30,6 +30,8 @@ CLIP_FRAMES: Final = 250
 CLIP: Final = CLIP_FRAMES * FRAME
 SPANS: Final = 4
 """Recordings of known number in one clip."""
+SMOOTH_SHARE: Final = 0.15
+"""Clips whose roughness is made less, or nothing."""
 PAUSE_S: Final = 1.6
 """Steps farther apart are of two walks."""
 HALF_CLIP: Final = CLIP // 2
@@ -186,8 +188,11 @@ class Sampler:
             span[k, first // FRAME : -(-last // FRAME)] = 1.0
             number[k], counted[k] = true, w
         weight[frames:] = 0.0
+        rows = rows_of(acc_g, total)
+        if self.rng.random() < SMOOTH_SHARE:
+            rows[:, :, front.ROUGHNESS] *= self.rng.random() < 0.5 and self.rng.random()
         return Clip(
-            rows=rows_of(acc_g, total),
+            rows=rows,
             walking=walking,
             walking_weight=weight,
             density=density,
