@@ -42,8 +42,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
             action="append" if repeated else "store",
             default=None if repeated else field.default,
             metavar=(meta["unit"] or "TEXT").upper(),
-            help=f"{meta['text']}{span}"
-            + ("" if field.default == "" else f" (default {_default(field.default)})"),
+            help=f"{meta['text']}{span}" + ("" if field.default == "" else f" (default {_default(field.default)})"),
         )
 
 
