@@ -331,6 +331,20 @@ class Segmented:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Walked:
+    """Durable: a walk `begins` or is over, by the verdict of `counter`, the primary, which recognises walking.
+
+    It begins at the device time from which it may have been one without a break, at most the counter's `latency_s`
+    before that was certain: so none of its steps lies much before. Told for every boot and primary of its own.
+    """
+
+    counter: str
+    boot: int
+    at_s: float
+    begins: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Described:
     """The device said something of itself (identity, rate, scale, battery)."""
 
@@ -397,6 +411,7 @@ Event = (
     | Corrected
     | Rebooted
     | Segmented
+    | Walked
     | Described
     | Signal
     | Counting
