@@ -22,6 +22,7 @@ from service.samples import (
     Signal,
     StepCounted,
     Tentative,
+    Walked,
 )
 from service.store.values import LogEntry, Note
 
@@ -66,6 +67,7 @@ KINDS: Final[dict[str, type[Any]]] = {
     "correction": Corrected,
     "reboot": Rebooted,
     "segment": Segmented,
+    "walk": Walked,
 }
 """Durable events that are no steps, by the name they are stored under."""
 _NAMES: Final = {event: kind for kind, event in KINDS.items()}
