@@ -156,15 +156,7 @@ def durable_view(notice: Notice) -> models.DurableEvent:
             view = _SAME_FIELDS[type(event)]
             return view(device=device, at=at, ordinal=ordinal, **dataclasses.asdict(event))
         case Walked():
-            return models.WalkEvent(
-                device=device,
-                at=at,
-                ordinal=ordinal,
-                status="began" if event.begins else "ended",
-                counter=event.counter,
-                device_s=event.at_s,
-                boot=event.boot,
-            )
+            return walk_view(notice)
         case _:
             raise TypeError(f"{event!r} is not durable")
 
@@ -190,6 +182,22 @@ def step_view(notice: Notice) -> models.StepEvent:
         valley=step.valley,
         upper=step.upper,
         lower=step.lower,
+    )
+
+
+def walk_view(notice: Notice) -> models.WalkEvent:
+    """Return a notice of a walk as an event."""
+    event = notice.event
+    if not isinstance(event, Walked):
+        raise TypeError(f"{event!r} is no walk")
+    return models.WalkEvent(
+        device=notice.device,
+        at=utc(notice.at_ns),
+        ordinal=notice.ordinal or 0,
+        status="began" if event.begins else "ended",
+        counter=event.counter,
+        device_s=event.at_s,
+        boot=event.boot,
     )
 
 

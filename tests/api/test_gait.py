@@ -76,6 +76,21 @@ async def test_the_feed_tells_verdict_and_walks():
         MESSAGE.validate_python(view)
 
 
+async def test_walks_are_listed_page_by_page():
+    async with standing("rest:1", counter="gate", beside=("metronome",)) as api:
+        (stand,) = api.stands
+        for packet in data_packets([10] * 190, boot=stand.bracelet.boot):
+            stand.device.session.apply(packet)
+        first = await api.ask("GET", "devices/sim-1/walks?limit=2")
+        assert [(walk["status"], walk["device_s"]) for walk in first["items"]] == [("began", 8.14), ("ended", 20.14)]
+        rest = await api.ask("GET", f"devices/sim-1/walks?after={first['next']}")
+        assert ([walk["status"] for walk in rest["items"]], rest["next"]) == (["began"], None)
+        steps = await api.ask("GET", "devices/sim-1/steps?counter=gate&limit=1000")
+        assert {step["type"] for step in steps["items"]} == {"step"}
+        assert "offset" in await api.refused("GET", "devices/sim-1/walks?from=2026-01-02T03:00:00", 422)
+        assert await api.refused("GET", "devices/nobody/walks", 404)
+
+
 async def test_a_counter_without_a_verdict_says_none():
     device, told = await shown(120, counter="metronome", beside=("gate",))
     assert (device["gait"], device["refused"]) == (None, {})
