@@ -335,7 +335,7 @@ class Walked:
     """Durable: a walk `begins` or is over, by the verdict of `counter`, the primary, which recognises walking.
 
     It begins at the device time from which it may have been one without a break, at most the counter's `latency_s`
-    before that was certain: so none of its steps lies much before. Told for every boot and primary of its own.
+    before that was certain, and is over where it was last called one. Another boot or primary ends it too.
     """
 
     counter: str

@@ -68,8 +68,8 @@ async def test_the_feed_tells_verdict_and_walks():
     assert [view["gait"]["verdict"] for view in counted[:: len(counted) // 10]][-4:] == ["walking"] * 3 + ["rest"]
     walks = [view.model_dump(mode="json") for view in only(told, Walked)]
     assert [(walk["type"], walk["status"], walk["device_s"], walk["counter"]) for walk in walks] == [
-        ("walk", "began", 8.14, "gate"),
-        ("walk", "ended", 20.14, "gate"),
+        ("walk", "began", 7.66, "gate"),
+        ("walk", "ended", 19.66, "gate"),
     ]
     assert walks[0]["ordinal"] < walks[1]["ordinal"]
     for view in (*counted, *walks):
@@ -82,7 +82,7 @@ async def test_walks_are_listed_page_by_page():
         for packet in data_packets([10] * 190, boot=stand.bracelet.boot):
             stand.device.session.apply(packet)
         first = await api.ask("GET", "devices/sim-1/walks?limit=2")
-        assert [(walk["status"], walk["device_s"]) for walk in first["items"]] == [("began", 8.14), ("ended", 20.14)]
+        assert [(walk["status"], walk["device_s"]) for walk in first["items"]] == [("began", 7.66), ("ended", 19.66)]
         rest = await api.ask("GET", f"devices/sim-1/walks?after={first['next']}")
         assert ([walk["status"] for walk in rest["items"]], rest["next"]) == (["began"], None)
         steps = await api.ask("GET", "devices/sim-1/steps?counter=gate&limit=1000")

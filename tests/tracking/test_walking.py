@@ -1,12 +1,13 @@
 """Whether somebody walks, through the fold: the newest verdict, walks in the log, and what was refused and why."""
 
 import json
+from itertools import cycle
 
 import pytest
 from fakes import GateCounter, MetronomeCounter, data_packets, described
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from waiting import HISTORY, Keeping, heard
+from waiting import HISTORY, Device, Keeping, heard, makers
 
 from service.errors import CounterError
 from service.samples import Counting, Gait, Rebooted, Segmented, StepCounted, Verdict, Walked
@@ -65,12 +66,12 @@ def test_a_counter_without_a_verdict_tells_none_and_no_walk():
     assert not any(state.values())  # nothing is kept that nobody will ask for
 
 
-def test_a_walk_begins_where_it_was_first_possible_and_ends_where_it_is_none():
+def test_a_walk_begins_where_it_was_first_possible_and_ends_where_it_was_last_one():
     events = run(ready(), data_packets([10] * 150))
     began, ended = walks(events)
-    assert began == (1, 407 / 50, True)  # the first of the frames called perhaps; certain at 503 / 50
-    assert ended == (1, 1007 / 50, False)
-    assert own(events)[0] == 400 / 50  # in that very frame
+    assert began == (1, 383 / 50, True)  # the end of the last frame before those called perhaps; certain at 503 / 50
+    assert ended == (1, 983 / 50, False)
+    assert (own(events)[0], own(events)[-1]) == (400 / 50, 975 / 50)
 
 
 @pytest.mark.parametrize(("latency_s", "from_s"), [(30.0, 1.0), (4.0, 7.0)])
@@ -80,8 +81,17 @@ def test_a_walk_begins_no_earlier_than_its_steps_are_credited(latency_s, from_s)
         assert walking.follow(Gait(float(at_s), PERHAPS, 0.6, None), 1) == []
     begun = walking.follow(Gait(11.0, WALKING, 0.95, 1.8), 1)
     assert begun == [Walked(counter="gate", boot=1, at_s=from_s, begins=True)]
-    assert walking.follow(Gait(12.0, PERHAPS, 0.6, None), 1)[0].begins is False
-    assert walking.follow(Gait(13.0, WALKING, 0.95, 1.8), 1)[0].at_s == 12.0
+    (ended,) = walking.follow(Gait(12.0, PERHAPS, 0.6, None), 1)
+    (again,) = walking.follow(Gait(13.0, WALKING, 0.95, 1.8), 1)
+    assert (ended.at_s, ended.begins, again.at_s, again.begins) == (11.0, False, 11.0, True)
+
+
+def test_a_gap_parts_what_may_be_walking_and_ends_a_walk_before_it():
+    walking = Walking("gate", latency_s=30.0)
+    walking.follow(Gait(1.0, PERHAPS, 0.6, None), 1)
+    (begun,) = walking.follow(Gait(9.0, WALKING, 0.95, 1.8), 1)
+    (ended,) = walking.follow(Gait(20.0, REST, 0.0, None), 1)
+    assert (begun.at_s, ended.at_s) == (9.0, 9.0)
 
 
 def test_each_verdict_refuses_its_own():
@@ -112,13 +122,44 @@ def test_neither_packet_sizes_nor_a_restart_change_walks_or_what_was_refused(siz
     assert (cut.gait, cut.refused, cut.cadence_spm) == (whole.gait, whole.refused, whole.cadence_spm)
 
 
+@pytest.mark.full
+@settings(max_examples=8, deadline=None)
+@given(sizes=st.lists(st.integers(1, 84), min_size=1, max_size=8), at=st.integers(0, 60))
+def test_so_it_is_with_our_own_counter(sizes, at):
+    device, counters = Device(60, script="rest:4,normal:25,rest:6"), makers(("steplink", "double_threshold"))
+
+    def begun(state=None):
+        tracker = Tracker(Keeping(), counters, primary="steplink")
+        if state is None:
+            run(tracker, device.said)
+        else:
+            tracker.restore(state)
+        return tracker
+
+    whole, cut, place, sent = begun(), begun(), 0, []
+    expected = run(whole, device.live(8))
+    for size in cycle(sizes):
+        sent.append(device.packet(place, size))
+        place += size
+        if place >= device.samples:
+            break
+    events = run(cut, sent[:at])
+    cut = begun(json.loads(json.dumps(cut.snapshot())))
+    events += run(cut, sent[at:])
+    assert walks(events) == walks(expected) != []
+    ours, theirs = (json.loads(json.dumps(tracker.snapshot())) for tracker in (cut, whole))
+    assert [ours[key] for key in ("walking", "refused", "steps")] == [
+        theirs[key] for key in ("walking", "refused", "steps")
+    ]
+
+
 def test_a_device_that_starts_again_ends_the_walk_and_settles_what_was_refused():
     tracker = ready()
     before = run(tracker, data_packets([10] * 95))
     settled = dict(tracker.refused["metronome"])
     events = run(tracker, data_packets([10] * 20, boot=2))
     place = events.index(only(events, Rebooted)[0])
-    assert walks(before) == [(1, 407 / 50, True)]
+    assert walks(before) == [(1, 383 / 50, True)]
     assert walks(events) == [(1, 935 / 50, False)]
     assert events.index(only(events, Walked)[0]) < place
     assert tracker.refused["metronome"] == settled  # all of boot 1 was walking at its end; boot 2's wait
@@ -184,5 +225,5 @@ def test_behind_a_hole_the_front_says_what_is_live_and_the_log_waits():
     healed = tracker.apply(packets[30])
     while tracker.has_work:
         healed += tracker.catch_up()
-    assert walks(healed) == [(1, 407 / 50, True)]
+    assert walks(healed) == [(1, 383 / 50, True)]
     assert tracker.refused["metronome"] == REFUSED
