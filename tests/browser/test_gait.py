@@ -51,6 +51,12 @@ def test_each_verdict_has_its_own_word_and_icon_and_says_how_sure_it_is(scripted
     assert len(icons) == len(WORDS)
 
 
+@pytest.mark.parametrize(("confidence", "told"), [(0.0, "under 1"), (0.995, "over 99"), (0.012, "1"), (0.99, "99")])
+def test_nothing_is_told_as_certain(scripted: Scripted, confidence: float, told: str) -> None:
+    page = scripted(recognising(gait=gait("perhaps", confidence))).open()
+    expect(field(page, "gait-sure")).to_have_text(f"Walking is {told}\u00a0% likely")
+
+
 @pytest.mark.parametrize("size", list(SIZES))
 def test_nothing_moves_when_somebody_begins_to_walk_or_is_lost(scripted: Scripted, size: str) -> None:
     width, height = SIZES[size]

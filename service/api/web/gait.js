@@ -22,8 +22,14 @@ const REFUSALS = [
 /** Return `{verdict, word, sure}` of a device: its name for icon and colour, in words, and how likely walking is. */
 export function gaitWords({ gait }) {
   if (gait == null || !Object.hasOwn(VERDICTS, gait.verdict)) return { verdict: "unknown", word: UNKNOWN, sure: "" };
-  const share = Math.round(100 * gait.confidence);
-  return { verdict: gait.verdict, word: VERDICTS[gait.verdict], sure: `Walking is ${share}\u00a0% likely` };
+  const sure = `Walking is ${likelihood(100 * gait.confidence)}\u00a0% likely`;
+  return { verdict: gait.verdict, word: VERDICTS[gait.verdict], sure };
+}
+
+/** Nothing is certain: no 0 and no 100. */
+function likelihood(share) {
+  if (share < 1) return "under 1";
+  return share > 99 ? "over 99" : whole(share);
 }
 
 /** Return what the primary refused, a sentence for each counter beside it; nothing where none runs. */
