@@ -156,8 +156,8 @@ class Update(NamedTuple):
     `likely` names every peak that can still become a step, where the counter can tell them apart; one it names no more
     and has not confirmed is retracted. `pending` counts those of them that pass what is in force. `trace` holds the
     filtered signal, one value a sample of the block, the first at device time `trace_from_s`. `gait` is the newest of a
-    counter that recognises walking, None of any other. A tuple, since one is made a packet and counter, and a frozen
-    dataclass takes twice as long to make.
+    counter that recognises walking, which has one in every update, None of any other. A tuple, since one is made a
+    packet and counter, and a frozen dataclass takes twice as long to make.
     """
 
     steps: tuple[Step, ...] = ()

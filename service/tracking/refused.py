@@ -15,6 +15,7 @@ from operator import itemgetter
 from typing import Any, Final
 
 from service.samples import Gait, Verdict
+from service.tracking.walking import FRAME_S
 
 NEAR_S: Final = 1.0
 """Two counters put the same step at most so far apart: a slow stride, of which one may see the other foot."""
@@ -38,16 +39,19 @@ class Refused:
         self._own: deque[float] = deque()
         """Times of the primary's steps."""
         self._runs: deque[tuple[float, Verdict]] = deque()
-        """Until when which verdict stood, without a change."""
+        """From when on which verdict stood."""
+        self._decided_s = 0.0
+        """Until when the newest does."""
 
     def say(self, gait: Gait | None) -> None:
         """Take the primary's newest verdict; None: it has none, and what waits is nobody's to judge."""
         if gait is None:
             self._forget()
             return
-        if self._runs and self._runs[-1][1] is gait.verdict:
-            self._runs.pop()
-        self._runs.append((gait.at_s, gait.verdict))
+        follows = bool(self._runs) and gait.at_s - self._decided_s <= FRAME_S
+        if not follows or self._runs[-1][1] is not gait.verdict:
+            self._runs.append((self._decided_s if follows else gait.at_s, gait.verdict))
+        self._decided_s = gait.at_s
 
     def count(self, at_s: float) -> None:
         """Take a step of the primary's."""
@@ -63,14 +67,14 @@ class Refused:
         """Judge what is certain by now: called after a block, when every counter has counted it."""
         if not self._runs:
             return
-        decided_s = self._runs[-1][0]
-        certain = bisect_right(self._waiting, decided_s - self._wait_s, key=itemgetter(0))
+        certain = bisect_right(self._waiting, self._decided_s - self._wait_s, key=itemgetter(0))
         if certain:
             self._judge(self._waiting[:certain])
             del self._waiting[:certain]
-        while self._own and self._own[0] < decided_s - KEPT_S:
+        kept_s = self._decided_s - KEPT_S
+        while self._own and self._own[0] < kept_s:
             self._own.popleft()
-        while self._runs[0][0] < decided_s - KEPT_S:
+        while len(self._runs) > 1 and self._runs[1][0] < kept_s:
             self._runs.popleft()
 
     def end(self) -> None:
@@ -90,6 +94,7 @@ class Refused:
             "waiting": [list(one) for one in self._waiting],
             "own": list(self._own),
             "runs": [list(run) for run in self._runs],
+            "decided_s": self._decided_s,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -97,7 +102,8 @@ class Refused:
         self.counts = {name: {why: count[why] for why in WHY} for name, count in state["counts"].items()}
         self._waiting = [(at_s, name) for at_s, name in state["waiting"]]
         self._own = deque(state["own"])
-        self._runs = deque((until_s, Verdict(verdict)) for until_s, verdict in state["runs"])
+        self._runs = deque((from_s, Verdict(verdict)) for from_s, verdict in state["runs"])
+        self._decided_s = state["decided_s"]
 
     def _judge(self, steps: Sequence[tuple[float, str]]) -> None:
         for at_s, counter in steps:
@@ -106,10 +112,11 @@ class Refused:
                 self.counts.setdefault(counter, dict.fromkeys(WHY, 0))[verdict] += 1
 
     def _verdict(self, at_s: float) -> Verdict:
-        """Return what the primary made of the motion at `at_s`: the first it said as of then or later, or its last."""
-        return next((verdict for until_s, verdict in self._runs if until_s >= at_s), self._runs[-1][1])
+        """Return what the primary made of the motion at `at_s`; of what it did not come to before a gap, its last."""
+        return next((verdict for from_s, verdict in reversed(self._runs) if from_s < at_s), self._runs[0][1])
 
     def _forget(self) -> None:
         self._waiting = []
         self._own.clear()
         self._runs.clear()
+        self._decided_s = 0.0

@@ -1,5 +1,7 @@
 """Whether somebody walks, over the API: verdict, confidence, cadence, walks, and what was refused and why."""
 
+import asyncio
+import json
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -7,7 +9,10 @@ import pytest
 from api.standing import standing
 from fakes import GateCounter, MetronomeCounter, data_packets
 from pydantic import TypeAdapter
+from stage import staged
 
+from device_sim.bracelet import Bracelet
+from device_sim.gait import Walker
 from service.api import models
 from service.api.views import event_view
 from service.counters import registry
@@ -116,3 +121,28 @@ async def test_the_schema_says_what_each_means():
     assert (gait["confidence"]["minimum"], gait["confidence"]["maximum"]) == (0.0, 1.0)
     for properties in (gait, schemas["RefusedModel"]["properties"]):
         assert all(field.get("description") for field in properties.values())
+
+
+@pytest.mark.full
+async def test_our_own_counter_over_the_air():
+    """A real GATT bracelet, the real service: somebody rests, walks for twenty seconds, and rests."""
+    bracelet = Bracelet(Walker("rest:16,normal:20,rest:60", seed=3))
+    async with staged(bracelet, speed=4, counter="steplink", beside=["double_threshold"]) as stage:
+        async with stage.live() as feed:
+            walking = await stage.until(lambda device: device["gait"] and device["gait"]["verdict"] == "walking")
+            assert walking["gait"]["confidence"] > 0.5
+            assert walking["cadence_spm"] == pytest.approx(110, abs=20)
+            page = await stage.poll("devices/sim-1/walks", lambda page: len(page["items"]) == 2)
+            heard = []
+            async with asyncio.timeout(20):
+                while [one["type"] for one in heard].count("walk") < 2:
+                    heard.append(json.loads(await feed.recv()))
+        resting = await stage.device()
+    assert [one for one in heard if one["type"] == "walk"] == page["items"]
+    began, ended = page["items"]
+    assert (began["status"], ended["status"]) == ("began", "ended")
+    assert ended["device_s"] - began["device_s"] == pytest.approx(20, abs=1.5)
+    assert (resting["gait"]["verdict"], resting["cadence_spm"]) == ("rest", None)
+    steps = [one for one in heard if one["type"] == "step" and one["counter"] == "steplink"]
+    assert all(began["device_s"] <= step["device_s"] <= ended["device_s"] + 0.5 for step in steps)
+    assert len(steps) > 30

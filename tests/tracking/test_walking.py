@@ -2,12 +2,13 @@
 
 import json
 from itertools import cycle
+from random import Random
 
 import pytest
 from fakes import GateCounter, MetronomeCounter, data_packets, described
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from waiting import HISTORY, Device, Keeping, heard, makers
+from waiting import HISTORY, Device, Keeping, fold_state, heal, heard, makers, plain, run, storm, waiting
 
 from service.errors import CounterError
 from service.samples import Counting, Gait, Rebooted, Segmented, StepCounted, Verdict, Walked
@@ -27,10 +28,6 @@ def ready(counters=COUNTERS, *, primary="gate"):
     for packet in described():
         tracker.apply(packet)
     return tracker
-
-
-def run(tracker, packets):
-    return [event for packet in packets for event in tracker.apply(packet)]
 
 
 def walks(events):
@@ -151,6 +148,24 @@ def test_so_it_is_with_our_own_counter(sizes, at):
     assert [ours[key] for key in ("walking", "refused", "steps")] == [
         theirs[key] for key in ("walking", "refused", "steps")
     ]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("loss", "burst"), [(0.05, 3), (0.2, 1)])
+def test_what_comes_late_leaves_no_trace_in_walks_or_refusals(loss, burst):
+    """Row 4, with history, for our own counter."""
+    names = ("steplink", "double_threshold")
+    device, rng = Device(60, script="rest:3,normal:12,rest:5"), Random(5)
+    whole, tracker = plain(names), waiting(names)
+    expected = run(whole, [*device.said, *device.live()])
+    run(tracker, device.said)
+    arriving = [packet for _, packet in storm(device, rng, loss=loss, burst=burst)]
+    assert len(arriving) < len(device.live())
+    events = heal(tracker, device, arriving, rng)
+    assert walks(events) == walks(expected)
+    assert len(walks(events)) >= 6
+    assert fold_state(tracker) == fold_state(whole)
+    assert (tracker.gait, tracker.refused) == (whole.gait, whole.refused)
 
 
 def test_a_device_that_starts_again_ends_the_walk_and_settles_what_was_refused():
