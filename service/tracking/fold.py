@@ -45,9 +45,8 @@ from service.tracking.tally import Tally
 from service.tracking.tentative import TentativeSteps
 from service.tracking.walking import Walking
 
-PIECE_SAMPLES: Final = 16
-"""The primary is given so much at a time: less than a frame of one that recognises walking, for no verdict shall pass
-unheard, and no less than most packets hold."""
+PIECE_SAMPLES: Final = 20
+"""A primary that recognises walking is given so much at a time, less than its frame: no verdict passes unheard."""
 
 CounterFactory = Callable[[], StepCounter]
 
@@ -82,6 +81,8 @@ class Fold:
         self._counters = {name: make() for name, make in counters.items()}
         self._cadence = Cadence()
         self._walking, self._refused = self._gate()
+        self._recognises = True
+        """Whether the primary has a verdict; it is believed to until it has counted a block and told none."""
         self._heading = WalkingDirection()
         self._timebase: Timebase | None = None
 
@@ -176,7 +177,7 @@ class Fold:
         events.append(Gridded(block=samples))
         pending = self.steps_now - self.total if self.primary in self.counter_faults else 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
-            cut_to = PIECE_SAMPLES if name == self.primary else len(samples)
+            cut_to = PIECE_SAMPLES if name == self.primary and self._recognises else len(samples)
             try:
                 updates = [self._counters[name].update(piece) for piece in pieces(samples, cut_to)]
             except CounterError as fault:
@@ -185,6 +186,7 @@ class Fold:
             events += [event for update in updates for event in self._take(name, update)]
             if name == self.primary:
                 pending = updates[-1].pending
+                self._recognises = updates[-1].gait is not None or not len(samples)
                 events += _signal(updates)
         if self.primary in self.counter_faults:
             events += self._recognise(None)
@@ -218,6 +220,7 @@ class Fold:
         self.primary, self._segment = primary, (before, self.steps[primary])
         self._cadence = Cadence()
         self._walking, self._refused = self._gate()
+        self._recognises = True
         events += self._follow((), ())
         return [*events, Segmented(primary=primary, steps=before), self._counting(0)]
 

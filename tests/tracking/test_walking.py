@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 from fakes import GateCounter, MetronomeCounter, data_packets, described
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from waiting import HISTORY, Device, Keeping, fold_state, heal, heard, makers, plain, run, storm, waiting
 
@@ -103,6 +103,7 @@ def test_each_verdict_refuses_its_own():
 
 @settings(max_examples=12, deadline=None)
 @given(sizes=st.lists(st.integers(1, 84), min_size=30, max_size=60), at=st.integers(0, 60))
+@example(sizes=[24] * 30, at=0)
 def test_neither_packet_sizes_nor_a_restart_change_walks_or_what_was_refused(sizes, at):
     whole, cut = ready(), ready()
     expected = run(whole, data_packets([8] * (sum(sizes) // 8) + [sum(sizes) % 8] * (sum(sizes) % 8 > 0)))
