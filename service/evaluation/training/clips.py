@@ -128,6 +128,8 @@ class Sampler:
                 step_s = step_s[inside] - begin / GRID_HZ
         if one.step_s is not None and one.source != SYNTHETIC and not one.at_wrist and rng.random() < 0.5:
             acc_g = motion.with_arm_swing(acc_g, step_s, rng)
+        if not one.true_steps and rng.random() < 0.5:
+            strength *= float(np.exp(rng.uniform(np.log(0.5), np.log(1.8))))
         if strength != 1.0:
             acc_g = motion.strengthened(acc_g, strength)
         if factor != 1.0:

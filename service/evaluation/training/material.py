@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from service.evaluation.choices import Found
 from service.evaluation.counting import grid_block
+from service.evaluation.training import motion
 from service.recordings import read
 from service.recordings.recording import Recording
 from service.samples import GRID_HZ
@@ -24,6 +25,8 @@ UNSTATED: Final = frozenset({"eth2023_wrist", "eth2022_wrist", "brajdic_walk", "
 
 SYNTHETIC: Final = "device_sim"
 """The source of synthetic walks."""
+EXERCISES: Final = "exercises"
+"""The source of synthetic arm motion without a step."""
 
 WALKS: Final = (
     "rest:6,normal:25,rest:4,slow:25,rest:5,fast:20,gesture:8",
@@ -49,6 +52,7 @@ WEIGHTS: Final = {
     "negatives_banglejs/still": 0.05,
     "pebble_wrist/still": 0.08,
     "device_sim/walk": 0.05,
+    "exercises/still": 0.1,
 }
 """How often a piece of a clip is of a pool: half of the walks of the wrist, and all that was hard to refuse often."""
 
@@ -113,6 +117,21 @@ def _true(recording: Recording) -> int | None:
     if recording.true_steps is None and recording.step_t_s is not None:
         return len(recording.step_t_s)
     return recording.true_steps
+
+
+def exercises(number: int, *, seed: int) -> list[Material]:
+    """Return synthetic arm motion without a step, a minute each."""
+    return [
+        Material(
+            source=EXERCISES,
+            subject=f"arm {one}",
+            placement="wrist",
+            activity="exercise",
+            acc_g=motion.exercise(60.0, np.random.default_rng([seed, one])),
+            true_steps=0,
+        )
+        for one in range(number)
+    ]
 
 
 def synthetic(wearers: int, *, seed: int) -> list[Material]:
