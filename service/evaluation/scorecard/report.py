@@ -170,7 +170,8 @@ def _changes(cards: Sequence[Scorecard]) -> Table:
     return Table(
         title="Disturbed walks",
         note=f"Absolute change of the count in %: the mean must not exceed {MUST_PERCENT:g}, none "
-        f"{NONE_ABOVE_PERCENT:g}; packets re-sent must change nothing. 8 bits are over ±8 g, rates are lowered without a filter.",
+        f"{NONE_ABOVE_PERCENT:g}; packets re-sent must change nothing. 8 bits are over ±8 g; rates are lowered without "
+        "a filter.",
         columns=("disturbance", "counter", "largest at", "rec.", "changed", "mean", "largest", "> 10 %", "met?"),
         lines=lines,
         left=3,
