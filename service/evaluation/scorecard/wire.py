@@ -4,6 +4,10 @@ Packets are the bracelet's own, ten samples of acceleration each at the recordin
 clock. Re-sent means that after every fourth packet the last three come once more, late and out of order: the count
 must be identical. Lost packets are single ones, drawn from the recording's name. The undisturbed count beside which
 these stand is that of the same packets, sent once.
+
+The Tracker says which samples it gives its counters, and where some are missing; each counter counts those, as much at
+a time as there is without a hole. That is the count it would have had live, since no counter may depend on how a
+stream is cut, and a fraction of the time.
 """
 
 from __future__ import annotations
@@ -15,15 +19,20 @@ from typing import Final
 import numpy as np
 
 from service.counters import registry
+from service.counters.streaming import COMPILED_FROM
+from service.evaluation.counting import part, streamed
 from service.evaluation.rows import Choice
-from service.evaluation.scorecard.sampled import Sampled
-from service.samples import TICK_HZ, Packet, Sensor
+from service.evaluation.scorecard.sampled import Sampled, columns, stacked
+from service.samples import TICK_HZ, Gridded, Packet, SampleBlock, Sensor
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 
 PACKET_SAMPLES: Final = 10
 RESENT_EVERY: Final = 4
 RESENT: Final = 3
+
+CHEAPEST: Final = "double_threshold"
+"""A Tracker has at least one counter."""
 
 ONCE: Final = "packets, sent once"
 TWICE: Final = "packets re-sent"
@@ -45,7 +54,15 @@ def counts(of: Sampled, chosen: Sequence[Choice], seed: int) -> dict[str, dict[s
     sent = packets(of)
     ways: dict[str, Iterable[Packet]] = {ONCE: sent, TWICE: again(sent)}
     ways |= {loss_name(percent): without(sent, percent, seed) for percent in LOSSES_PERCENT}
-    return {name: _steps(of.rate_hz, way, able) for name, way in ways.items()}
+    found: dict[str, dict[str, int]] = {}
+    for name, way in ways.items():
+        parts = gridded(of.rate_hz, way)
+        found[name] = {choice.counter: _steps(choice, parts) for choice in able}
+    return found
+
+
+def _steps(choice: Choice, parts: Iterable[SampleBlock]) -> int:
+    return len(streamed(registry.make(choice.counter, choice.preset, choice.overrides), parts))
 
 
 def packets(of: Sampled) -> list[Packet]:
@@ -84,15 +101,27 @@ def without(sent: Sequence[Packet], percent: float, seed: int) -> list[Packet]:
     return kept
 
 
-def _steps(rate_hz: float, sent: Iterable[Packet], chosen: Sequence[Choice]) -> dict[str, int]:
-    makers = {
-        choice.counter: partial(registry.make, choice.counter, choice.preset, choice.overrides) for choice in chosen
-    }
-    tracker = Tracker(wire.Bracelet(), makers, primary=chosen[0].counter)
+def gridded(rate_hz: float, sent: Iterable[Packet]) -> list[SampleBlock]:
+    """Return what a Tracker makes of packets: the samples of the grid, each stretch without a hole as one block."""
+    tracker = Tracker(wire.Bracelet(), {CHEAPEST: partial(registry.make, CHEAPEST)}, primary=CHEAPEST)
+    stretches: list[list[SampleBlock]] = []
+    awaited = -1
     for packet in (*_description(rate_hz), *sent):
-        tracker.apply(packet)
-    tracker.finish()
-    return tracker.steps
+        for event in tracker.apply(packet):
+            if isinstance(event, Gridded) and len(event.block):
+                if event.block.start != awaited:
+                    stretches.append([])
+                stretches[-1].append(event.block)
+                awaited = event.block.start + len(event.block)
+    return [_joined(stretch) for stretch in stretches]
+
+
+def _joined(stretch: Sequence[SampleBlock]) -> SampleBlock:
+    whole = SampleBlock(
+        start=stretch[0].start, acc_g=columns(np.concatenate([stacked(block.acc_g) for block in stretch]))
+    )
+    # Short ones go through plain Python, which wants lists.
+    return part(whole, 0, len(whole), as_lists=len(whole) <= COMPILED_FROM)
 
 
 def _description(rate_hz: float) -> list[Packet]:

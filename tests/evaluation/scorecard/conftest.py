@@ -12,6 +12,7 @@ from service.evaluation.scorecard.measured import Measured
 def _plain_python(monkeypatch):
     """Numba would take longer to compile than these tests to run."""
     monkeypatch.setattr("service.counters.streaming.compiled", lambda kernel: kernel)
+    monkeypatch.setattr("service.signals.timebase.compiled", lambda kernel: kernel)
     monkeypatch.setattr("service.evaluation.counting.available", lambda: False)
 
 

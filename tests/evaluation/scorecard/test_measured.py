@@ -31,9 +31,13 @@ def test_a_walk_is_counted_plainly_and_in_every_disturbance(tmp_path):
     assert (outcome.counted, outcome.true, outcome.placement, outcome.quality) == (57, 60, "wrist", "B")
 
 
-def test_a_short_walk_is_not_disturbed_and_a_rest_is(tmp_path):
+def test_a_short_walk_is_not_disturbed(tmp_path):
     assert measured(tmp_path / "a.npz", walk(10))[0].disturbed == {}
     assert measured(tmp_path / "a.npz", walk(10, true_steps=None, step_t_s=None))[0].disturbed == {}
+
+
+@pytest.mark.full
+def test_a_rest_is_disturbed(tmp_path):
     rest = measured(tmp_path / "a.npz", still(3))[0]
     assert (rest.steps, rest.disturbed[wire.TWICE]) == (0, 0)
 
