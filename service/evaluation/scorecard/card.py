@@ -57,6 +57,14 @@ class Timed:
     metronome: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lost:
+    """A splice, or the walkers of a situation, that could not be counted."""
+
+    what: str
+    why: str
+
+
 class Scorecard:
     """All that was measured of one counter; each part is put together when it is asked for."""
 
@@ -67,11 +75,13 @@ class Scorecard:
         rows: Sequence[Measured],
         spliced: Sequence[Spliced],
         walked: Sequence[Walked],
+        lost: Sequence[Lost] = (),
     ) -> None:
         self.counter = counter
         self.preset = preset
         self.rows = [row for row in rows if row.steps is not None]
         self.errors = [row for row in rows if row.error is not None]
+        self.lost = lost
         self._spliced = spliced
         self._walked = walked
 

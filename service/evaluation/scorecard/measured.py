@@ -70,7 +70,7 @@ def measure(file: Found, chosen: Sequence[Choice], lsb_per_g: float) -> list[Mea
         recording = read(file.path, lsb_per_g=lsb_per_g, mapping=file.mapping, rate_hz=file.rate_hz)
         block = grid_block(recording)
     except Exception as error:  # one recording must not end the others
-        return failed(file, chosen, _told(error))
+        return failed(file, chosen, told(error))
     about = _about(file, recording)
     plain = [_counted(replace(about, counter=choice.counter), recording, block, choice) for choice in chosen]
     if about.true_steps is None or 0 < about.true_steps < FEWEST_STEPS:
@@ -109,7 +109,7 @@ def _counted(row: Measured, recording: Recording, block: SampleBlock, choice: Ch
     try:
         counted = count(block, choice.counter, choice.preset, choice.overrides)
     except Exception as error:  # one counter must not end the others
-        return replace(row, error=_told(error))
+        return replace(row, error=told(error))
     row = replace(row, steps=counted.steps)
     if recording.step_t_s is None:
         return row
@@ -131,5 +131,6 @@ def _of(sent: Mapping[str, Mapping[str, int]], counter: str) -> dict[str, int]:
     return {name: steps[counter] for name, steps in sent.items() if counter in steps}
 
 
-def _told(error: Exception) -> str:
+def told(error: Exception) -> str:
+    """Return why something was not counted, in a sentence."""
     return str(error) if isinstance(error, SteplinkError) else f"{type(error).__name__}: {error}"

@@ -13,6 +13,7 @@ from service.evaluation.scorecard import report
 from service.evaluation.scorecard.card import Scorecard
 from service.evaluation.scorecard.charts import LEVELS, charts
 
+LEARNER: Final = "steplink"
 PAGE: Final = ".md"
 DRAWING: Final = ".svg"
 
@@ -33,6 +34,9 @@ Wrist and phone walks are all recordings with steps, by where the sensor was wor
 sitting down, standing up: each may hide a step) stands apart, without a limit. Driving and desk is
 `negatives_banglejs`; Pebble non-walking holds that set's own driving, reading, washing up and gestures. Phone handling
 is `brajdic_handling`."""
+LEARNT: Final = """\
+The counter `steplink` has learnt from some of these very sets, as its model card says: there its figures are those of
+recordings it has seen, and tell nothing of an unseen source. The card has those of its cross-validation."""
 BUDGET: Final = """\
 The error by rate, range, resolution and loss is that of the same walks, changed: those of 50 steps or more to which
 every level applies. By cadence, placement, the device's own rate and whether its range ended, other people and sensors
@@ -92,6 +96,8 @@ def markdown(cards: Sequence[Scorecard], stem: str) -> str:
         f"# {TITLE}",
         HOW,
         _of(cards),
+        *report.errors(cards),
+        *([LEARNT] if LEARNER in {card.counter for card in cards} else []),
         "## The scorecard",
         FAMILIES,
         *figure("walks"),

@@ -14,6 +14,7 @@ from service.evaluation.scorecard.disturbances import MUST_PERCENT, NATIVE, NONE
 from service.evaluation.tables import aligned
 
 F1_MUST: Final = 0.9
+REASONS_SHOWN: Final = 3
 WHOLE_FROM: Final = 20.0
 """False steps an hour from which on a tenth is not told."""
 
@@ -48,7 +49,7 @@ class Table:
 def text(cards: Sequence[Scorecard]) -> str:
     """Return everything for a terminal."""
     asked = "; ".join(f"{card.counter} (preset {card.preset})" for card in cards)
-    return "\n\n".join([f"scorecard of {asked}", *(table.text() for table in tables(cards)), *_errors(cards)])
+    return "\n\n".join([f"scorecard of {asked}", *(table.text() for table in tables(cards)), *errors(cards)])
 
 
 def tables(cards: Sequence[Scorecard]) -> list[Table]:
@@ -227,15 +228,21 @@ def _shares(cards: Sequence[Scorecard], parts: budget.Ranking) -> list[list[str]
     ]
 
 
-def _errors(cards: Iterable[Scorecard]) -> list[str]:
-    made = []
-    for card in cards:
-        if card.errors:
-            reasons = dict.fromkeys(row.error or "" for row in card.errors)
-            more = f" and {len(reasons) - 3} more reasons" if len(reasons) > 3 else ""
-            shown = "; ".join(list(reasons)[:3]) + more
-            made.append(f"not counted by {card.counter}: {len(card.errors)} recordings ({shown})")
-    return made
+def errors(cards: Iterable[Scorecard]) -> list[str]:
+    """Say what was not counted, by whom and why; what was lost is so for all of them."""
+    made = [
+        f"not counted by {card.counter}: {len(card.errors)} recordings ({_some(reasons)})"
+        for card in cards
+        if (reasons := [row.error or "" for row in card.errors])
+    ]
+    lost = dict.fromkeys(f"{each.what}: {each.why}" for card in cards for each in card.lost)
+    return [*made, *([f"lost: {len(lost)} ({_some(list(lost))})"] if lost else [])]
+
+
+def _some(reasons: Sequence[str]) -> str:
+    once = list(dict.fromkeys(reasons))
+    more = f"; and {len(once) - REASONS_SHOWN} more reasons" if len(once) > REASONS_SHOWN else ""
+    return "; ".join(once[:REASONS_SHOWN]) + more
 
 
 def _unit(family: Family) -> str:

@@ -12,8 +12,8 @@ from functools import partial
 from service.evaluation.choices import Found
 from service.evaluation.pool import ENDED, Progress, mapped
 from service.evaluation.rows import Choice
-from service.evaluation.scorecard.card import Scorecard
-from service.evaluation.scorecard.measured import Measured, failed, measure
+from service.evaluation.scorecard.card import Lost, Scorecard
+from service.evaluation.scorecard.measured import Measured, failed, measure, told
 from service.evaluation.scorecard.situations import SITUATIONS, Situation, Walked, synthetic
 from service.evaluation.scorecard.splices import Splice, Spliced, spliced, splices
 
@@ -38,7 +38,7 @@ async def scorecards(
     """Count splices and walkers too, and return a scorecard for each counter, in the order given."""
     items: list[Splice | Situation] = [*splices(rows), *(each for each in SITUATIONS if each.walkers is not None)]
     work = partial(counted, chosen=chosen, lsb_per_g=lsb_per_g)
-    made = [each for found in await mapped(work, items, jobs=jobs, progress=progress, ended=_nothing) for each in found]
+    made = [each for found in await mapped(work, items, jobs=jobs, progress=progress, ended=_ended) for each in found]
     return [
         Scorecard(
             choice.counter,
@@ -46,15 +46,23 @@ async def scorecards(
             [row for row in rows if row.counter == choice.counter],
             [each for each in made if isinstance(each, Spliced) and each.counter == choice.counter],
             [each for each in made if isinstance(each, Walked) and each.counter == choice.counter],
+            lost=[each for each in made if isinstance(each, Lost)],
         )
         for choice in chosen
     ]
 
 
-def counted(item: Splice | Situation, chosen: Sequence[Choice], lsb_per_g: float) -> list[Spliced | Walked]:
+def counted(item: Splice | Situation, chosen: Sequence[Choice], lsb_per_g: float) -> list[Spliced | Walked | Lost]:
     """Count one splice, or the walkers of one situation."""
-    return [*spliced(item, chosen, lsb_per_g)] if isinstance(item, Splice) else [*synthetic(item, chosen)]
+    try:
+        return [*spliced(item, chosen, lsb_per_g)] if isinstance(item, Splice) else [*synthetic(item, chosen)]
+    except Exception as error:  # one of them must not end the others
+        return [Lost(what=_name(item), why=told(error))]
 
 
-def _nothing(_: Splice | Situation) -> list[Spliced | Walked]:
-    return []
+def _ended(item: Splice | Situation) -> list[Spliced | Walked | Lost]:
+    return [Lost(what=_name(item), why=ENDED)]
+
+
+def _name(item: Splice | Situation) -> str:
+    return f"splice of {item.dataset} {item.subject}" if isinstance(item, Splice) else f"walkers: {item.label}"

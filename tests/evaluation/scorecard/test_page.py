@@ -9,10 +9,11 @@ from markdown_it import MarkdownIt
 
 from service import cli
 from service.errors import ParameterError
-from service.evaluation.scorecard import page, report
+from service.evaluation.scorecard import page, report, run
 from service.evaluation.scorecard.card import Scorecard
 from service.evaluation.scorecard.chart import WIDTH, Bars, Chart
 from service.evaluation.scorecard.charts import charts
+from service.evaluation.scorecard.situations import SITUATIONS
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -50,6 +51,13 @@ def test_the_text_has_every_table_that_has_lines_and_no_other(cards):
 def test_what_was_not_counted_is_told(row):
     card = Scorecard("fusion", "tuned", [row(), row(steps=None, error="it lacks a gyroscope")], (), ())
     assert report.text([card]).endswith("not counted by fusion: 1 recordings (it lacks a gyroscope)")
+
+
+def test_what_is_lost_is_told_once(cards, monkeypatch):
+    monkeypatch.setattr("service.evaluation.scorecard.run.synthetic", lambda *_: 1 / 0)
+    (lost,) = run.counted(SITUATIONS[0], (), 32.0)
+    made = [Scorecard(card.counter, "tuned", card.rows, (), (), lost=[lost]) for card in cards]
+    assert report.text(made).endswith("lost: 1 (walkers: slow, 0.8 steps/s: ZeroDivisionError: division by zero)")
 
 
 def test_a_table_is_markdown_that_a_page_can_show(cards):
