@@ -32,7 +32,7 @@ class Family(StrEnum):
     DRIVING_AND_DESK = "driving and desk"
     PEBBLE = "Pebble non-walking"
     HANDLING = "phone handling"
-    TRANSITIONS = "getting up, lying and sitting down"
+    TRANSITIONS = "getting up and down"
     """Apart from the household: each may hide a step."""
 
 
@@ -115,7 +115,7 @@ def family(
     >>> family("anyone", "front_pocket", "walk", "A", 100).value
     'phone walks'
     >>> family("negatives_hmp", "wrist", "getup_bed", "B", 0).value
-    'getting up, lying and sitting down'
+    'getting up and down'
     """
     if true_steps is None:
         return None

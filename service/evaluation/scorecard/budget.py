@@ -18,7 +18,7 @@ from service.evaluation.scorecard import wire
 from service.evaluation.scorecard.disturbances import DISTURBANCES, NATIVE
 from service.evaluation.scorecard.measured import Measured
 
-SHOWN: Final = 5
+SHOWN: Final = 3
 """Recordings, and activities, of each family that are named."""
 CADENCES_HZ: Final = (1.4, 1.6, 1.8, 2.0, 2.2)
 """Between two of these lies a band of cadence."""
@@ -88,6 +88,12 @@ def _largest(family: Family, rows: Sequence[Measured], key: Callable[[Measured],
         if any(values)
     ]
     return sorted(parts, key=lambda part: (-part.share, part.name))[:SHOWN]
+
+
+RANKINGS: Final[dict[str, Ranking]] = {
+    "Activities that dominate the error": by_activity,
+    "Recordings that dominate the error": by_recording,
+}
 
 
 def by_cadence(rows: Iterable[Measured]) -> list[Level]:

@@ -12,8 +12,8 @@ from service.evaluation.scorecard.card import Scorecard
 from service.evaluation.scorecard.chart import Bars, Chart
 from service.evaluation.scorecard.measured import Measured
 
-DRAWN: Final = 3
-"""Parts of each family that are drawn."""
+SHARES: Final = ("activities", "recordings")
+"""What dominates the error, by the figure's name; each counter has its own."""
 PERCENT: Final = "% of the true steps"
 PER_HOUR: Final = "false steps/h"
 
@@ -37,8 +37,11 @@ def charts(cards: Sequence[Scorecard]) -> dict[str, Chart]:
     made = {
         "walks": _families(cards, [family for family in Family if family in WALKS], "Walks", PERCENT),
         "quiet": _families(cards, [family for family in Family if family not in WALKS], "Without steps", PER_HOUR),
-        "activities": _shares(cards, budget.by_activity, "Activities that dominate"),
-        "recordings": _shares(cards, budget.by_recording, "Recordings that dominate"),
+        **{
+            f"{name}_{card.counter}": _shares(card, title)
+            for name, title in zip(SHARES, budget.RANKINGS, strict=True)
+            for card in cards
+        },
     }
     made |= {name: _levels(cards, title, levels) for name, (title, levels) in LEVELS.items()}
     return {name: chart for name, chart in made.items() if chart.groups}
@@ -60,13 +63,10 @@ def _families(cards: Sequence[Scorecard], families: Sequence[Family], title: str
     return Chart(title=title, unit=f"{unit}; line: limit", series=_series(cards), groups=list(bars()))
 
 
-def _shares(cards: Sequence[Scorecard], parts: budget.Ranking, title: str) -> Chart:
-    """Draw the first counter's shares: those of another are of other activities."""
-    first = cards[0]
-    found = parts(first.rows)
-    largest = [part for family in Family for part in [each for each in found if each.family is family][:DRAWN]]
-    groups = [Bars(name=f"{part.family.value}: {_short(part.name)}", values=[part.share]) for part in largest]
-    return Chart(title=f"{title} ({first.counter})", unit="% of the family", series=[first.counter], groups=groups)
+def _shares(card: Scorecard, title: str) -> Chart:
+    parts = budget.RANKINGS[title](card.rows)
+    groups = [Bars(name=f"{part.family.value}: {_short(part.name)}", values=[part.share]) for part in parts]
+    return Chart(title=f"{title}: {card.counter}", unit="% of the family's", series=[card.counter], groups=groups)
 
 
 def _short(name: str) -> str:

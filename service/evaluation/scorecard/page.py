@@ -11,7 +11,7 @@ from service.errors import ParameterError
 from service.evaluation.metrics import SECONDS_PER_HOUR
 from service.evaluation.scorecard import report
 from service.evaluation.scorecard.card import Scorecard
-from service.evaluation.scorecard.charts import LEVELS, charts
+from service.evaluation.scorecard.charts import LEVELS, SHARES, charts
 
 LEARNER: Final = "steplink"
 PAGE: Final = ".md"
@@ -37,6 +37,9 @@ is `brajdic_handling`."""
 LEARNT: Final = """\
 The counter `steplink` has learnt from some of these very sets, as its model card says: there its figures are those of
 recordings it has seen, and tell nothing of an unseen source. The card has those of its cross-validation."""
+PARTS: Final = """\
+A recording's share is its own percentage over the sum of its family's, or its false steps over all of them; the largest
+are drawn."""
 BUDGET: Final = """\
 The error by rate, range, resolution and loss is that of the same walks, changed: those of 50 steps or more to which
 every level applies. By cadence, placement, the device's own rate and whether its range ended, other people and sensors
@@ -85,12 +88,9 @@ def write(to: Drawings, cards: Sequence[Scorecard]) -> None:
 def markdown(cards: Sequence[Scorecard], stem: str) -> str:
     """Return the page; its figures are files whose names begin with `stem`."""
     drawn = charts(cards)
-    tables = {table.title: table.markdown() for table in report.tables(cards)}
-    activities, recordings = (table.title for table in report.budget_tables(cards))
-    budget = [tables.pop(title) for title in (activities, recordings) if title in tables]
 
-    def figure(name: str) -> list[str]:
-        return [f"![{drawn[name].title}]({stem}_{name}{DRAWING})"] if name in drawn else []
+    def figures(*names: str) -> list[str]:
+        return [f"![{drawn[name].title}]({stem}_{name}{DRAWING})" for name in names if name in drawn]
 
     parts = [
         f"# {TITLE}",
@@ -100,17 +100,14 @@ def markdown(cards: Sequence[Scorecard], stem: str) -> str:
         *([LEARNT] if LEARNER in {card.counter for card in cards} else []),
         "## The scorecard",
         FAMILIES,
-        *figure("walks"),
-        *figure("quiet"),
-        *tables.values(),
+        *figures("walks", "quiet"),
+        *(table.markdown() for table in report.tables(cards)),
         "## The error's parts",
-        *budget[:1],
-        *figure("activities"),
-        *budget[1:],
-        *figure("recordings"),
+        PARTS,
+        *(figure for what in SHARES for card in cards for figure in figures(f"{what}_{card.counter}")),
         "### By what was measured, and how",
         BUDGET,
-        *(part for name in LEVELS for part in figure(name)),
+        *figures(*LEVELS),
     ]
     return "\n\n".join(parts) + "\n"
 

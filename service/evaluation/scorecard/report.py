@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, TypeVar
 
-from service.evaluation.families import LIMITS, WALKS, Family, Limit
+from service.evaluation.families import LIMITS, WALKS, Family
 from service.evaluation.scorecard import budget
 from service.evaluation.scorecard.card import ASKED_DISTURBANCES, Scorecard
 from service.evaluation.scorecard.disturbances import MUST_PERCENT, NATIVE, NONE_ABOVE_PERCENT
 from service.evaluation.tables import aligned
 
+Row = TypeVar("Row")
+
 F1_MUST: Final = 0.9
 REASONS_SHOWN: Final = 3
+OVER: Final = "!"
+"""Beside a value that is over its limit."""
 WHOLE_FROM: Final = 20.0
 """False steps an hour from which on a tenth is not told."""
 
@@ -30,152 +34,166 @@ class Table:
     left: int = 2
 
     def text(self) -> str:
-        """Return it for a terminal; what is repeated from the line above is left out."""
+        """Return it for a terminal."""
+        parts = [self.title, *([self.note] if self.note else [])]
+        return "\n".join([*parts, aligned([self.columns, *self._told_once()], left=self.left)])
+
+    def markdown(self) -> str:
+        """Return it for the guide, whose policy refuses the style that an alignment becomes."""
+        rule = ["---"] * len(self.columns)
+        rows = "\n".join(f"| {' | '.join(line)} |" for line in (self.columns, rule, *self._told_once()))
+        return "\n\n".join([f"### {self.title}", *([self.note] if self.note else []), rows])
+
+    def _told_once(self) -> list[list[str]]:
+        """Leave out what the line above has begun with too."""
         lines = [list(line) for line in self.lines]
         for before, line in reversed(list(pairwise(lines))):
             if before[0] == line[0]:
                 line[0] = ""
-        parts = [self.title, *([self.note] if self.note else []), aligned([list(self.columns), *lines], left=self.left)]
-        return "\n".join(parts)
-
-    def markdown(self) -> str:
-        """Return it for the guide."""
-        rule = ["---"] * self.left + ["---:"] * (len(self.columns) - self.left)
-        lines = [self.columns, rule, *self.lines]
-        parts = [f"### {self.title}", *([self.note] if self.note else [])]
-        return "\n\n".join([*parts, "\n".join(f"| {' | '.join(line)} |" for line in lines)])
+        return lines
 
 
 def text(cards: Sequence[Scorecard]) -> str:
     """Return everything for a terminal."""
     asked = "; ".join(f"{card.counter} (preset {card.preset})" for card in cards)
-    return "\n\n".join([f"scorecard of {asked}", *(table.text() for table in tables(cards)), *errors(cards)])
+    return "\n\n".join(
+        [f"scorecard of {asked}", *(table.text() for table in (*tables(cards), *shares(cards))), *errors(cards)]
+    )
 
 
 def tables(cards: Sequence[Scorecard]) -> list[Table]:
     """Return every table that has lines."""
     made = [
         families(cards), _sources(cards), _ranges(cards), _splices(cards), _timed(cards), _changes(cards),
-        _disturbed(cards), _situations(cards), *budget_tables(cards),
+        _disturbed(cards), _situations(cards),
     ]  # fmt: skip
     return [table for table in made if table.lines]
 
 
-def budget_tables(cards: Sequence[Scorecard]) -> list[Table]:
-    """Return which activities and recordings dominate the error."""
-    note = "Share of the family's error, or of its false steps, in %: the largest of each family."
-    columns = ("family", "counter", "what", "rec.", "share %")
-    return [
-        Table(title=title, columns=columns, lines=_shares(cards, parts), note=note, left=3)
-        for title, parts in (
-            ("Activities that dominate the error", budget.by_activity),
-            ("Recordings that dominate the error", budget.by_recording),
+def shares(cards: Sequence[Scorecard]) -> list[Table]:
+    """Return which activities and which recordings dominate the error of each counter."""
+    made = [
+        Table(
+            title=f"{title}: {card.counter}",
+            columns=("family", "what", "rec.", "share %"),
+            lines=[
+                [part.family.value, part.name, str(part.recordings), f"{part.share:.1f}"] for part in parts(card.rows)
+            ],
         )
+        for title, parts in budget.RANKINGS.items()
+        for card in cards
     ]
+    return [table for table in made if table.lines]
 
 
 def families(cards: Sequence[Scorecard]) -> Table:
     """Return the families' values beside their limits."""
+    names = [card.counter for card in cards]
     lines = []
     for family in Family:
-        for card in cards:
-            if (score := card.families.get(family)) is not None:
-                figures = [_figure(score.value, family), _figure(score.over_sources, family)]
-                cells = [str(score.recordings), f"{score.hours:.2f}", *figures, *_limits(score.limit)]
-                lines.append([family.value, _unit(family), card.counter, *cells, _met(met=score.met)])
+        found = [card.families.get(family) for card in cards]
+        if (first := next(filter(None, found), None)) is not None:
+            values = ["" if score is None else _over(score.value, family) for score in found]
+            means = ["" if score is None else _figure(score.over_sources, family) for score in found]
+            size = [str(first.recordings), f"{first.hours:.2f}"]
+            lines.append([family.value, _unit(family), *values, *_limits(family), *means, *size])
     return Table(
         title="Families",
-        note="Mean absolute error over the recordings in % of the true steps, or false steps an hour; beside it the "
-        "mean over the sources.",
-        columns=("family", "in", "counter", "rec.", "hours", "value", "over sources", "must", "aim", "met?"),
+        note=f"Mean absolute error over the recordings in % of the true steps, or false steps an hour; {OVER} is over "
+        "what it must be. Beside it the mean over the sources.",
+        columns=("family", "in", *names, "must", "aim", *(f"{name}, sources" for name in names), "rec.", "hours"),
+        lines=lines,
+    )
+
+
+def _sources(cards: Sequence[Scorecard]) -> Table:
+    def by_source(card: Scorecard, family: Family) -> Mapping[str, float]:
+        return card.families[family].by_source if family in card.families else {}
+
+    lines = [
+        [family.value, source, _unit(family), *values]
+        for family in Family
+        for source in dict.fromkeys(name for card in cards for name in by_source(card, family))
+        for found in [[by_source(card, family).get(source) for card in cards]]
+        for values in [["" if value is None else _figure(value, family) for value in found]]
+    ]
+    return Table(
+        title="Sources",
+        note="The same, of each data set.",
+        columns=("family", "data set", "in", *(card.counter for card in cards)),
         lines=lines,
         left=3,
     )
 
 
-def _sources(cards: Sequence[Scorecard]) -> Table:
-    lines = [
-        [family.value, _unit(family), source, card.counter, _figure(value, family)]
-        for family in Family
-        for source in sorted(
-            {name for card in cards if family in card.families for name in card.families[family].by_source}
-        )
-        for card in cards
-        if (value := _by_source(card, family).get(source)) is not None
-    ]
-    return Table(title="Sources", columns=("family", "in", "data set", "counter", "value"), lines=lines, left=4)
-
-
-def _by_source(card: Scorecard, family: Family) -> Mapping[str, float]:
-    return card.families[family].by_source if family in card.families else {}
-
-
 def _ranges(cards: Sequence[Scorecard]) -> Table:
-    lines = [
-        [dataset, card.counter, str(share.recordings), str(share.within), f"{share.percent:.1f}"]
-        for dataset in sorted({name for card in cards for name in card.shares})
-        for card in cards
-        if (share := card.shares.get(dataset)) is not None
-    ]
+    lines = []
+    for dataset in dict.fromkeys(name for card in cards for name in card.shares):
+        found = [card.shares.get(dataset) for card in cards]
+        recordings = max(share.recordings for share in found if share is not None)
+        lines.append([dataset, *("" if share is None else f"{share.percent:.1f}" for share in found), str(recordings)])
     return Table(
         title="Counts within what the truth allows",
-        columns=("data set", "counter", "rec.", "within", "%"),
+        note="Where the truth is a range: % of the counts within it.",
+        columns=("data set", *(card.counter for card in cards), "rec."),
         lines=lines,
+        left=1,
     )
 
 
 def _splices(cards: Sequence[Scorecard]) -> Table:
     lines = []
     for family in Family:
-        for card in cards:
-            if (found := card.spliced.get(family)) is not None:
-                alone = card.families[family].value if family in card.families else None
-                figures = [_rate(found.false_per_hour), "" if alone is None else _rate(alone)]
-                cells = [str(found.subjects), str(found.clips), f"{found.hours:.2f}", *figures]
-                lines.append([family.value, card.counter, *cells, *_limits(LIMITS.get(family))])
+        found = [card.spliced.get(family) for card in cards]
+        if (first := next(filter(None, found), None)) is not None:
+            values = ["" if each is None else _over(each.false_per_hour, family) for each in found]
+            size = [str(first.subjects), str(first.clips), f"{first.hours:.2f}"]
+            lines.append([family.value, *values, *_limits(family), *size])
     return Table(
         title="Step-free clips between two walks",
         note="All clips of a subject in a row, between two pieces of a walk; false steps an hour of the clips.",
-        columns=("family", "counter", "subjects", "clips", "hours", "false/h", "alone", "must", "aim"),
+        columns=("family", *(card.counter for card in cards), "must", "aim", "subjects", "clips", "hours"),
         lines=lines,
+        left=1,
     )
 
 
 def _timed(cards: Sequence[Scorecard]) -> Table:
+    names = [card.counter for card in cards]
     lines = []
     for dataset, subject in dict.fromkeys((row.dataset, row.subject) for card in cards for row in card.timed):
-        for card in cards:
-            for row in card.timed:
-                if (row.dataset, row.subject) == (dataset, subject):
-                    cells = [str(row.recordings), f"{row.f1:.3f}", f"{row.metronome:.3f}"]
-                    lines.append([dataset, subject or "all", card.counter, *cells])
+        found = [_first(card.timed, dataset=dataset, subject=subject) for card in cards]
+        f1 = ["" if row is None else f"{row.f1:.3f}" for row in found]
+        metronome = ["" if row is None else f"{row.metronome:.3f}" for row in found]
+        recordings = max(row.recordings for row in found if row is not None)
+        lines.append([dataset, subject or "all", *f1, *metronome, str(recordings)])
     return Table(
         title="Step times",
         note=f"F1 at ±0.15 s (must be {F1_MUST:.2f} on oxford_opt), all steps together; the metronome ticks as often, "
         "evenly spread.",
-        columns=("data set", "subject", "counter", "rec.", "F1", "metronome"),
+        columns=("data set", "subject", *names, *(f"{name}, metronome" for name in names), "rec."),
         lines=lines,
-        left=3,
     )
 
 
 def _changes(cards: Sequence[Scorecard]) -> Table:
     lines = []
     for name in ASKED_DISTURBANCES:
-        for card in cards:
-            for row in card.changes:
-                if row.disturbance == name:
-                    figures = [str(row.changed), f"{row.mean:.2f}", f"{row.largest:.1f}", str(row.above)]
-                    where = row.where if row.largest else ""
-                    lines.append([name, card.counter, where, str(row.recordings), *figures, _met(met=row.met)])
+        found = [_first(card.changes, disturbance=name) for card in cards]
+        if any(found):
+            values = ["" if row is None else f"{row.mean:.2f} ({row.largest:.1f})" for row in found]
+            marked = [_marked(value, met=row is None or row.met) for value, row in zip(values, found, strict=True)]
+            where = [row.where if row is not None and row.largest else "" for row in found]
+            recordings = max(row.recordings for row in found if row is not None)
+            lines.append([name, *marked, str(recordings), *where])
     return Table(
         title="Disturbed walks",
-        note=f"Absolute change of the count in %: the mean must not exceed {MUST_PERCENT:g}, none "
-        f"{NONE_ABOVE_PERCENT:g}; packets re-sent must change nothing. 8 bits are over ±8 g; rates are lowered without "
-        "a filter.",
-        columns=("disturbance", "counter", "largest at", "rec.", "changed", "mean", "largest", "> 10 %", "met?"),
+        note="Absolute change of the count in %, the mean and in brackets the largest: they must not exceed "
+        f"{MUST_PERCENT:g} and {NONE_ABOVE_PERCENT:g}, and packets re-sent must change nothing. 8 bits are over ±8 g; "
+        "rates are lowered without a filter.",
+        columns=("disturbance", *(card.counter for card in cards), "rec.", *(f"{card.counter} at" for card in cards)),
         lines=lines,
-        left=3,
+        left=1,
     )
 
 
@@ -184,48 +202,35 @@ def _disturbed(cards: Sequence[Scorecard]) -> Table:
     for family in Family:
         for card in cards:
             if (found := card.disturbed.get(family)) is not None:
-                limit, plain = LIMITS.get(family), card.families[family].value
-                met = None if limit is None else all(value <= limit.must for value in (plain, *found.values()))
-                cells = [_rate(plain), *(_rate(found[name]) for name in ASKED_DISTURBANCES)]
-                lines.append(
-                    [family.value, card.counter, *cells, "" if limit is None else f"{limit.must:g}", _met(met=met)]
-                )
+                values = (card.families[family].value, *(found[name] for name in ASKED_DISTURBANCES))
+                must, _ = _limits(family)
+                lines.append([family.value, card.counter, *(_over(value, family) for value in values), must])
     return Table(
         title="Disturbed, without steps",
         note="False steps an hour; a recording whose own rate is no higher is counted as it is.",
-        columns=("family", "counter", NATIVE, *ASKED_DISTURBANCES, "must", "all met?"),
+        columns=("family", "counter", NATIVE, *ASKED_DISTURBANCES, "must"),
         lines=lines,
     )
 
 
 def _situations(cards: Sequence[Scorecard]) -> Table:
-    keys = dict.fromkeys((row.label, row.source) for card in cards for row in card.situations)
     lines = []
-    for label, source in keys:
-        for card in cards:
-            for row in card.situations:
-                if (row.label, row.source) == (label, source):
-                    figures = [f"{row.error:.1f}", f"{row.bias:+.1f}", f"{row.worst:.1f}"]
-                    cells = [str(row.walks), str(row.true), str(row.counted), *figures]
-                    lines.append([label, source, card.counter, *cells])
+    for label, source in dict.fromkeys((row.label, row.source) for card in cards for row in card.situations):
+        found = [_first(card.situations, label=label, source=source) for card in cards]
+        first = next(row for row in found if row is not None)
+        values = ["" if row is None else f"{row.error:.1f} ({row.bias:+.1f})" for row in found]
+        lines.append([label, source, *values, str(first.walks), str(first.true)])
     return Table(
         title="Situations",
-        note="Mean absolute error, bias and largest error in % of the true steps; `walkers` are synthetic.",
-        columns=("situation", "source", "counter", "walks", "true", "counted", "error %", "bias %", "largest %"),
+        note="Mean absolute error and in brackets the bias, in % of the true steps; `walkers` are synthetic.",
+        columns=("situation", "source", *(card.counter for card in cards), "walks", "true steps"),
         lines=lines,
-        left=3,
     )
 
 
-def _shares(cards: Sequence[Scorecard], parts: budget.Ranking) -> list[list[str]]:
-    found = {card.counter: parts(card.rows) for card in cards}
-    return [
-        [family.value, counter, part.name, str(part.recordings), f"{part.share:.1f}"]
-        for family in Family
-        for counter, ranked in found.items()
-        for part in ranked
-        if part.family is family
-    ]
+def _first(rows: Iterable[Row], **wanted: str) -> Row | None:
+    """Return the row whose fields are as wanted."""
+    return next((row for row in rows if all(getattr(row, name) == value for name, value in wanted.items())), None)
 
 
 def errors(cards: Iterable[Scorecard]) -> list[str]:
@@ -252,16 +257,18 @@ def _unit(family: Family) -> str:
 def _figure(value: float, family: Family) -> str:
     if family in WALKS:
         return f"{value:.2f}"
-    return _rate(value)
+    return f"{value:.0f}" if value >= WHOLE_FROM else f"{value:.1f}"
 
 
-def _rate(per_hour: float) -> str:
-    return f"{per_hour:.0f}" if per_hour >= WHOLE_FROM else f"{per_hour:.1f}"
+def _over(value: float, family: Family) -> str:
+    """Tell a value, marked where it is over the family's limit."""
+    return _marked(_figure(value, family), met=family not in LIMITS or value <= LIMITS[family].must)
 
 
-def _limits(limit: Limit | None) -> list[str]:
+def _marked(told: str, *, met: bool) -> str:
+    return told if met else f"{told} {OVER}"
+
+
+def _limits(family: Family) -> list[str]:
+    limit = LIMITS.get(family)
     return ["", ""] if limit is None else [f"{limit.must:g}", f"{limit.aim:g}"]
-
-
-def _met(*, met: bool | None) -> str:
-    return "" if met is None else "yes" if met else "no"

@@ -33,16 +33,16 @@ def cards(row):
 
 
 def test_the_families_stand_beside_their_limits(cards):
-    lines = report.families(cards).lines
-    assert lines[0] == ["wrist walks", "%", "double_threshold", "1", "0.02", "10.00", "10.00", "5.5", "3", "no"]
-    assert lines[1][5:] == ["1.00", "1.00", "5.5", "3", "yes"]
-    assert lines[2][5:] == ["50", "50", "8", "2", "no"]
+    walks, desk = report.families(cards).lines
+    assert walks == ["wrist walks", "%", "10.00 !", "1.00", "5.5", "3", "10.00", "1.00", "1", "0.02"]
+    assert desk[2:6] == ["50 !", "50 !", "8", "2"]
 
 
 def test_the_text_has_every_table_that_has_lines_and_no_other(cards):
     text = report.text(cards)
     assert "scorecard of double_threshold (preset tuned); plus_minus (preset tuned)" in text
-    titles = [table.title for table in report.tables(cards)]
+    titles = [table.title for table in (*report.tables(cards), *report.shares(cards))]
+    assert "Recordings that dominate the error: plus_minus" in titles
     assert "Families" in titles
     assert "Step times" not in titles
     assert all(f"\n{title}\n" in text for title in titles)
@@ -62,8 +62,23 @@ def test_what_is_lost_is_told_once(cards, monkeypatch):
 
 def test_a_table_is_markdown_that_a_page_can_show(cards):
     shown = MarkdownIt("commonmark", {"html": False}).enable("table").render(report.families(cards).markdown())
-    assert shown.count("<tr>") == 5
-    assert "<th" in shown
+    assert shown.count("<tr>") == 3
+    assert "<th>plus_minus</th>" in shown
+    assert "style" not in shown
+
+
+def test_what_a_line_begins_with_is_told_once():
+    table = report.Table(title="T", columns=("a", "b"), lines=[["x", "1"], ["x", "2"], ["y", "2"]])
+    assert table.markdown().splitlines()[2:] == ["| a | b |", "| --- | --- |", "| x | 1 |", "|  | 2 |", "| y | 2 |"]
+    assert [line.split() for line in table.text().splitlines()[3:]] == [["x", "1"], ["2"], ["y", "2"]]
+
+
+def test_a_disturbed_family_is_marked_where_it_is_over_its_limit(row):
+    quiet = {"true_steps": 0, "steps": 0, "activity": "desk", "duration_s": 3600.0}
+    card = Scorecard("fusion", "tuned", [row(**quiet, disturbed={"8 bits": 9, "25 Hz": 8})], (), ())
+    (table,) = [table for table in report.tables([card]) if table.title == "Disturbed, without steps"]
+    told = dict(zip(table.columns, table.lines[0], strict=True))
+    assert (told["as recorded"], told["8 bits"], told["25 Hz"], told["must"]) == ("0.0", "9.0 !", "8.0", "8")
 
 
 def boxes(svg):
