@@ -31,7 +31,7 @@ GROUND: Final = "#ffffff"
 FONT: Final = "system-ui, sans-serif"
 HALO: Final = f' stroke="{GROUND}" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'
 """Around letters, where a line crosses them."""
-LETTER: Final = 6.6
+LETTER: Final = 7.0
 """A letter's width, about."""
 
 

@@ -66,7 +66,8 @@ def _families(cards: Sequence[Scorecard], families: Sequence[Family], title: str
 def _shares(card: Scorecard, title: str) -> Chart:
     parts = budget.RANKINGS[title](card.rows)
     groups = [Bars(name=f"{part.family.value}: {_short(part.name)}", values=[part.share]) for part in parts]
-    return Chart(title=f"{title}: {card.counter}", unit="% of the family's", series=[card.counter], groups=groups)
+    short, unit = f"{title.partition(' ')[0]}: {card.counter}", "% of the family's error or false steps"
+    return Chart(title=short, unit=unit, series=[card.counter], groups=groups)
 
 
 def _short(name: str) -> str:

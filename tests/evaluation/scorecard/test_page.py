@@ -11,7 +11,7 @@ from service import cli
 from service.errors import ParameterError
 from service.evaluation.scorecard import page, report, run
 from service.evaluation.scorecard.card import Scorecard
-from service.evaluation.scorecard.chart import WIDTH, Bars, Chart
+from service.evaluation.scorecard.chart import LETTER, WIDTH, Bars, Chart
 from service.evaluation.scorecard.charts import charts
 from service.evaluation.scorecard.situations import SITUATIONS
 
@@ -98,7 +98,7 @@ def test_bars_are_as_long_as_their_values_and_lie_within_a_phones_width():
     texts = ["".join(text.itertext()) for text in drawing.iter(f"{SVG}text")]
     assert {"T", "u", "one", "two", "a < b", "50.0", "100", "0.0"} < set(texts)
     assert all(float(box.get("x")) + float(box.get("width")) < WIDTH for box in boxes(svg))
-    assert max(map(len, texts)) * 6.6 < WIDTH
+    assert max(map(len, texts)) * LETTER < WIDTH
 
 
 def test_a_drawing_holds_nothing_that_the_guides_policy_refuses(cards):
