@@ -134,7 +134,12 @@ class Scorecard:
 
     def as_json(self) -> Iterable[dict[str, Any]]:
         """Yield every figure as a row of plain data: `part` and `counter` say what it is."""
-        parts = {**self._parts(), "recording": [_recording(row) for row in self.rows]}
+        parts = {
+            **self._parts(),
+            "recording": [_recording(row) for row in self.rows],
+            "not counted": [{"what": row.name, "why": row.error} for row in self.errors]
+            + [asdict(of) for of in self.lost],
+        }
         for part, found in parts.items():
             for row in found:
                 yield {"part": part, "counter": self.counter, "preset": self.preset, **row}

@@ -87,6 +87,8 @@ def test_json_is_plain_rows_that_say_what_they_are(row):
     assert {each["part"] for each in told} == {
         "family", "within range", "disturbance", "disturbed family", "recording",
     }  # fmt: skip
+    (lost,) = list(card(row(steps=None, error="it lacks a gyroscope")).as_json())
+    assert (lost["part"], lost["what"], lost["why"]) == ("not counted", "walks/w", "it lacks a gyroscope")
     (desk,) = [each for each in told if each.get("family") == "driving and desk" and each["part"] == "family"]
     assert (desk["value"], desk["unit"], desk["must"], desk["aim"]) == (240.0, "false steps/h", 8.0, 2.0)
     assert {each["counter"] for each in told} == {"double_threshold"}

@@ -11,9 +11,9 @@ from service.evaluation.scorecard.measured import measure
 CHOSEN = choices(["double_threshold", "fusion"], "tuned", [])
 
 
-def measured(path, recording, **more):
+def measured(path, recording, chosen=CHOSEN, **more):
     file = Found(shown="shown", path=save(recording, path, **more), dataset="d")
-    return measure(file, CHOSEN, 32.0)
+    return measure(file, chosen, 32.0)
 
 
 @pytest.mark.full
@@ -32,8 +32,8 @@ def test_a_walk_is_counted_plainly_and_in_every_disturbance(tmp_path):
 
 
 def test_a_short_walk_is_not_disturbed(tmp_path):
-    assert measured(tmp_path / "a.npz", walk(10))[0].disturbed == {}
-    assert measured(tmp_path / "a.npz", walk(10, true_steps=None, step_t_s=None))[0].disturbed == {}
+    assert measured(tmp_path / "a.npz", walk(10), CHOSEN[:1])[0].disturbed == {}
+    assert measured(tmp_path / "a.npz", walk(10, true_steps=None, step_t_s=None), CHOSEN[:1])[0].disturbed == {}
 
 
 @pytest.mark.full
