@@ -227,8 +227,12 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         " synthetic walkers and on recordings of the same conditions (PATH, else those of STEPLINK_DATA)",
     )
     parser.add_argument(
-        "--figures", metavar="DIR", help="draw the papers' figures and the agreement there, as PNG (extra: figures)"
+        "--figures",
+        metavar="DIR",
+        help="draw the papers' figures and the agreement there, as PNG (extra: figures); with --scorecard its own, as"
+        " SVG",
     )
+    _add_scorecard(parser)
     cores = os.cpu_count() or 1
     parser.add_argument(
         "--jobs", type=_whole(1, 256), default=cores, help=f"recordings counted at once (default {cores}, the cores)"
@@ -238,6 +242,27 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         type=_whole(1, 65535),
         default=32,
         help="scale of recordings in raw units, LSB/g (default 32)",
+    )
+
+
+def _add_scorecard(parser: argparse.ArgumentParser) -> None:
+    """Add what makes an evaluation a scorecard."""
+    parser.add_argument(
+        "--scorecard",
+        action="store_true",
+        help="tell everything that is asked of a counter: families beside their limits, step-free clips between two"
+        " walks, step times, disturbances, situations, what dominates the error",
+    )
+    parser.add_argument(
+        "--split",
+        metavar="NAME",
+        default="dev",
+        help="with --scorecard: recordings that an index.csv lists with another split are left out (default dev)",
+    )
+    parser.add_argument(
+        "--guide",
+        metavar="FILE",
+        help="with --scorecard: write it there as a page of the guide (.md), its figures (.svg) beside it",
     )
 
 
