@@ -44,11 +44,11 @@ FRAMES_AT_ONCE: Final = 4096
 class SteplinkParams:
     """Parameters; the defaults are the tuned ones."""
 
-    certain: float = parameter(0.9, unit="probability", low=0.5, high=0.999, text="a frame that makes a walk certain")
+    certain: float = parameter(0.85, unit="probability", low=0.5, high=0.999, text="a frame that makes a walk certain")
     possible: float = parameter(0.4, unit="probability", low=0.05, high=0.9, text="a frame that may be of a walk")
     whole: float = parameter(0.7, unit="probability", low=0.06, high=0.99, text="a frame that credits all its steps")
     least_steps: int = parameter(4, unit="steps", low=1, high=12, text="steps that make a walk certain; all count")
-    evidence: float = parameter(0.0, unit="logits", low=0, high=100, text="how sure the frames are together")
+    evidence: float = parameter(10.0, unit="logits", low=0, high=100, text="how sure the frames are together")
     pause: int = parameter(2, unit="frames", low=0, high=6, text="frames without walking that do not end a walk")
     patience: int = parameter(23, unit="frames", low=4, high=25, text="frames that wait to be credited, of 0.48 s each")
 

@@ -35,6 +35,8 @@ WALKS: Final = (
     "brush:20,rest:4,normal:8,wave:12,rest:3,slow:30",
     "rest:5,uphill:20,downhill:20,knock:8,rest:5,normal:6,rest:8,normal:6",
     "sit:8,rest:6,stand:8,slow:20,normal:20,fast:20,run:10",
+    "rest:6,very_slow:40,rest:6,trolley:30,rest:5,in_place:25",
+    "rest:5,normal:3,rest:5,slow:4,rest:6,fast:3,rest:5,normal:5,rest:6,pocket:4,rest:5,slow:6,type:8,normal:4,rest:6",
 )
 """What the synthetic wearers do, in seconds each."""
 
@@ -46,13 +48,13 @@ WEIGHTS: Final = {
     "banglejs_walk/walk": 0.08,
     "oxford_opt/walk": 0.28,
     "dcaiti/walk": 0.04,
-    "negatives_spar_watch/still": 0.12,
+    "negatives_spar_watch/still": 0.14,
     "negatives_hmp/still": 0.13,
     "negatives_hmp/doubt": 0.03,
     "negatives_banglejs/still": 0.05,
     "pebble_wrist/still": 0.08,
-    "device_sim/walk": 0.05,
-    "exercises/still": 0.08,
+    "device_sim/walk": 0.07,
+    "exercises/still": 0.13,
 }
 """How often a piece of a clip is of a pool: half of the walks of the wrist, and all that was hard to refuse often."""
 
