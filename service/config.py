@@ -23,6 +23,9 @@ class Settings:
     preset: str = option("tuned", "its parameters: paper (as published) or tuned")
     beside: tuple[str, ...] = option((), "another counter to run on the same stream; may be repeated", unit="name")
     param: tuple[str, ...] = option((), "a parameter of a counter, NAME.KEY=VALUE; may be repeated", unit="name.key=v")
+    weights: str = option(
+        "", "weights of the counter steplink, a file that `steplink train` made; without it those that come with it"
+    )
     durable_limit: int = option(
         1000, "events that may wait for a slow reader before it is closed", unit="events", low=10, high=100_000
     )
