@@ -1,0 +1,19 @@
+"""The numbers of a training, where whoever tells of them reads them too: the command's help and the model card."""
+
+from __future__ import annotations
+
+from typing import Final
+
+BATCH: Final = 24
+STEPS: Final = 1500
+HIGHEST_RATE: Final = 4e-3
+DECAY: Final = 1e-3
+EXACT_FROM: Final = 0.5
+"""Share of the steps after which rounding begins."""
+
+WEARERS: Final = 24
+"""Synthetic walkers that teach beside the recordings."""
+
+TUNING_STEPS: Final = 120
+TUNING_RATE: Final = 5e-4
+"""Of a fine-tuning: an eighth of the usual highest rate, for a twelfth of the steps. Ours."""
