@@ -94,6 +94,8 @@ async def train(options: argparse.Namespace) -> int:
         weights_file.checked(options.card, "card")
     found, _ = choices.find(options.data, mapping(options), options.rate_hz)
     files = sources.told_apart(found)
+    if "none" in options.folds and len(set(options.folds)) > 1:
+        raise ParameterError("folds", options.folds, "none beside others")
     if options.start is not None:
         return _fine_tune(options, files)
     _anew(options, files)

@@ -22,11 +22,14 @@ from service.evaluation.training import folds, motion, recipe, sources, validati
 from service.evaluation.training.card_text import ABOUT_FIGURES, DIGEST_BEFORE, HEAD, LIMITS, NOT_MEASURED, RECIPE, USE
 from service.evaluation.training.clips import CLIP, PAUSE_S
 from service.evaluation.training.material import SYNTHETIC, WEIGHTS, Material
+from service.evaluation.training.runs import shares
 from service.evaluation.training.validation import Validation
 from service.samples import GRID_HZ
 
 DATA_HEAD: Final = ("set", "holds", "from", "licence", "recordings", "minutes", "steps", "learnt from")
-POOL_HEAD: Final = ("source", "walks or none", "share")
+POOL_HEAD: Final = ("source", "of it", "share")
+KINDS: Final = {"walk": "walks", "still": "no steps", "doubt": "none, perhaps a hidden step"}
+SYNTHETIC_SHARE: Final = {pool: share for pool, share in WEIGHTS.items() if pool.startswith(SYNTHETIC)}
 SECONDS_PER_MINUTE: Final = 60.0
 UNKNOWN: Final = "not recorded in the file"
 
@@ -120,11 +123,8 @@ def _described(name: str, figures: Line) -> Line:
 
 
 def _recipe(about: Mapping[str, Any], teaching: Sequence[Material]) -> str:
-    pools = [
-        (f"`{name}`", "walks" if kind == "walk" else "no steps" if kind == "still" else "no steps, in doubt", f"{w:g}")
-        for (name, _, kind), w in ((pool.partition("/"), weight) for pool, weight in WEIGHTS.items())
-        if name in {*(one.source for one in teaching), SYNTHETIC}
-    ]
+    drawn = shares(teaching) | SYNTHETIC_SHARE
+    pools = [_pool(pool, share / sum(drawn.values())) for pool, share in drawn.items()]
     told = RECIPE.format(
         steps=about.get("steps", UNKNOWN),
         seed=about.get("seed", UNKNOWN),
@@ -139,6 +139,11 @@ def _recipe(about: Mapping[str, Any], teaching: Sequence[Material]) -> str:
         rates=", ".join(f"{rate:g}" for rate in motion.RATES_HZ),
     )
     return f"{told.strip()}\n\n{_table(POOL_HEAD, pools)}"
+
+
+def _pool(pool: str, share: float) -> Line:
+    name, _, kind = pool.partition("/")
+    return f"`{name}`", KINDS.get(kind, kind), f"{100.0 * share:.0f} %"
 
 
 def _figures(measured: Sequence[Validation]) -> str:

@@ -53,7 +53,7 @@ the integers that the counter computes with.
 Each piece is changed at random: pace, orientation, gain and offset of axes, noise, rate ({rates} Hz), resolution, a
 range of ±{range_g} g, stretches lost; and recordings at the body are hung on a synthetic arm that swings.
 
-How often a piece is of a source, the shares being relative:
+How often a piece is of a source:
 """
 
 LIMITS: Final = """\

@@ -40,9 +40,18 @@ def fit(
 
 
 def course(
-    sampler: Sampler, *, steps: int, seed: int, start: model.Params | None = None, rate: float = HIGHEST_RATE
+    sampler: Sampler,
+    *,
+    steps: int,
+    seed: int,
+    start: model.Params | None = None,
+    rate: float = HIGHEST_RATE,
+    exact_from: float = EXACT_FROM,
 ) -> Iterator[tuple[int, float, model.Params]]:
-    """Yield each step's number from 1 on, the loss before it and the weights after it, in plain units."""
+    """Yield each step's number from 1 on, the loss before it and the weights after it, in plain units.
+
+    Rounding begins after the share `exact_from` of the steps.
+    """
     params = model.fresh(seed) if start is None else start
     schedule = optax.cosine_onecycle_schedule(steps, rate, pct_start=0.2)
     optimiser = optax.chain(optax.clip_by_global_norm(1.0), optax.adamw(schedule, weight_decay=DECAY))
@@ -51,7 +60,7 @@ def course(
     key = jax.random.PRNGKey(seed)
     for number, clips in enumerate(batches(sampler, steps)):
         key, now = jax.random.split(key)
-        params, state, value = advance[number >= EXACT_FROM * steps](params, state, clips, now)
+        params, state, value = advance[number >= exact_from * steps](params, state, clips, now)
         yield number + 1, float(value), params
 
 

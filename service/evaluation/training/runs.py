@@ -24,7 +24,7 @@ from service.counters.steplink import SteplinkCounter
 from service.counters.steplink_network import Weights, weights_of
 from service.errors import TrainingError
 from service.evaluation.training.material import OTHERS, WEIGHTS, Material
-from service.evaluation.training.recipe import HIGHEST_RATE
+from service.evaluation.training.recipe import EXACT_FROM, HIGHEST_RATE
 from service.samples import SampleBlock
 
 NEEDED: Final = ("jax", "optax")
@@ -41,7 +41,7 @@ POLL_S: Final = 0.3
 """How often the bar is drawn."""
 
 LAST: Final = 50
-"""Steps whose mean loss is told as the loss at the end, and as many for the one at the beginning."""
+"""Steps whose mean loss is told as that at the beginning and at the end; a fifth of a short training's."""
 
 Arrays = Mapping[str, NDArray[np.int32]]
 Progress = Callable[[int, int], None]
@@ -52,7 +52,7 @@ class Run:
     """One training: of the material at the places `taught`; what is `held` is then counted.
 
     It goes on from `start`, weights as the counter has them, at the highest rate `rate`; None: from nothing, at the
-    usual one. Weights are kept after each number of steps in `checkpoints`, of `steps`.
+    usual one, and rounding begins later. Weights are kept after each number of steps in `checkpoints`, of `steps`.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Checkpoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trained:
-    """What came of a run; `first_loss` and `last_loss` are means over LAST steps."""
+    """What came of a run; `first_loss` and `last_loss` are means over a few steps."""
 
     run: Run
     kept: Sequence[Checkpoint]
@@ -179,16 +179,19 @@ def train(run: Run, material: Sequence[Material], tick: Callable[[], None] = lam
     sampler = Sampler(taught, shares(taught), seed=run.seed)
     start = None if run.start is None else model.plain(run.start)
     rate = HIGHEST_RATE if run.rate is None else run.rate
+    exact_from = EXACT_FROM if start is None else 0.0
     losses: list[float] = []
     kept: list[Checkpoint] = []
-    for number, loss, params in fit.course(sampler, steps=run.steps, seed=run.seed, start=start, rate=rate):
+    course = fit.course(sampler, steps=run.steps, seed=run.seed, start=start, rate=rate, exact_from=exact_from)
+    for number, loss, params in course:
         if not np.isfinite(loss):
             raise TrainingError(f"{run.name}: the loss is {loss} after {number} steps; another seed may do")
         losses.append(loss)
         if number in run.checkpoints:
             kept.append(_checkpoint(number, model.integers(params), material, run.held))
         tick()
-    first, last = (float(np.mean(part)) for part in (losses[:LAST], losses[-LAST:]))
+    told = min(LAST, max(run.steps // 5, 1))
+    first, last = (float(np.mean(part)) for part in (losses[:told], losses[-told:]))
     return Trained(run=run, kept=kept, first_loss=first, last_loss=last)
 
 

@@ -19,7 +19,7 @@ from service.evaluation.training.validation import Validation, validation
 WEARERS_SEED: Final = 5
 
 UNSEEN: Final = "Sources that never taught"
-TITLES: Final = {folds.SOURCES: "Each source held back", folds.SUBJECTS: "Subjects held back, a fifth at a time"}
+TITLES: Final = {folds.SOURCES: "Each source held back", folds.SUBJECTS: "Subjects held back, part by part"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
