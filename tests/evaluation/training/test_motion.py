@@ -24,7 +24,7 @@ def crests_s(acc_g):
 
 
 def noise(samples, seed):
-    return np.random.default_rng(seed).standard_normal((samples, 3)) + [0.0, 0.0, 1.0]
+    return np.random.default_rng(seed).normal([0.0, 0.0, 1.0], 1.0, (samples, 3))
 
 
 @few
