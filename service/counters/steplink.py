@@ -87,7 +87,7 @@ class SteplinkCounter:
         self._past = network.fresh_past()
         self._rows: list[float] = []
         """Rows of the frame that is not complete."""
-        self._rhythm = np.zeros((rhythm.WINDOW - network.FRAME_ROWS, rhythm.COLUMNS))
+        self._rhythm = np.zeros((rhythm.COLUMNS, rhythm.WINDOW - network.FRAME_ROWS))
         self._trace = [0.0] * 16
         self._made = [0.0] * (8 * front.ROW)
 
@@ -135,7 +135,7 @@ class SteplinkCounter:
             for values, past in zip(kept["past"], network.fresh_past(), strict=True)
         ]
         self._rows = list(map(float, kept["rows"]))
-        self._rhythm = np.array(kept["rhythm"]).reshape(-1, rhythm.COLUMNS)
+        self._rhythm = np.array(kept["rhythm"]).reshape(rhythm.COLUMNS, -1)
 
     def count(self, block: SampleBlock) -> NDArray[np.float64]:
         """Count a whole recording from a fresh state without making a Step of each; rows as in `steplink_bouts`."""
@@ -228,8 +228,8 @@ class SteplinkCounter:
         logits = network.run(self._weights, sensed, self._past).tolist()
         walking = [z * rhythm.LOGIT for z, _ in logits]
         pace = [rhythm.cadence_hz(z) for _, z in logits]
-        seen = np.concatenate((self._rhythm, rows[:, front.SENSED :]))
-        self._rhythm = seen[len(seen) - len(self._rhythm) :]
+        seen = np.concatenate((self._rhythm, rows[:, front.SENSED :].T), axis=1)
+        self._rhythm = seen[:, network.FRAME_ROWS * len(logits) :]
         perhaps = [i for i, z in enumerate(walking) if z > self._bouts[bouts.LOW]]
         if perhaps:
             r = rhythm.correlations(rhythm.windows(seen)[perhaps])

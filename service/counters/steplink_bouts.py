@@ -250,24 +250,44 @@ def _range(s: State, from_: int, to: int) -> float:
 
 
 def likely(s: State) -> list[Likely]:
-    """Return the crests of a certain walk that the network has not judged yet, where the next steps are expected."""
+    """Return the crests of a certain walk that the network has not judged yet, where the next steps are expected.
+
+    Runs once a packet, plain. The last crest may still grow, and is told once the magnitude falls from it.
+    """
     found: list[Likely] = []
-    if s[WALKING] <= 0.0 or s[NEXT] < 0.0 or s[CADENCE] <= 0.0:
+    if s[WALKING] <= 0.0 or s[NEXT] < 0.0:
         return found
-    period, seen, last, offset = GRID_HZ / s[CADENCE], int(s[NEXT]), s[LAST], s[OFFSET]
+    period, seen, last, offset = GRID_HZ / s[CADENCE], int(s[NEXT]), int(s[LAST]), s[OFFSET]
     due = s[DECIDED] + (1.0 - s[PART]) * period
+    base = max(int(s[FIRST]), last, seen - LENGTH + 1, 0)
+    recent = _recent(s, base, seen)
+    least = CREST_SHARE * s[SIZE_G]
     while due < seen:
-        at = _crest(s, due, period, offset, last, seen)
+        at = _crest_in(recent, base, due, period, offset, last)
         if at >= seen:
             break
-        height = s[RING + at % LENGTH]
-        size = height - _lowest(s, max(int(last), at - int(period), int(s[FIRST])), at)
-        fallen = height - _lowest(s, at, seen - 1) if at < seen else 0.0
-        least = CREST_SHARE * s[SIZE_G]
-        if size >= least and fallen >= least:
-            found.append((float(at), size, True))
-            last = float(at)
+        low = min(recent[max(last, at - int(period), base) - base : at - base + 1])
+        height = recent[at - base]
+        if height - low >= least and height - min(recent[at - base :]) >= least:
+            found.append((float(at), height - low, True))
+            last = at
             offset += FOLLOW * ((at - due) / period - offset)
             offset -= floor(offset)
         due += period
     return found
+
+
+def _recent(s: State, from_: int, to: int) -> Sequence[float]:
+    """Return the magnitudes from index `from_` up to `to`."""
+    a, b = RING + from_ % LENGTH, RING + to % LENGTH
+    return s[a:b] if a < b else [*s[a : RING + LENGTH], *s[RING:b]]
+
+
+def _crest_in(recent: Sequence[float], base: int, due: float, period: float, offset: float, last: int) -> int:
+    """Return the same as `_crest`, of magnitudes that begin at index `base`."""
+    centre = due + offset * period
+    from_ = max(ceil(max(due, centre - 0.5 * period)), base + 2)
+    if last >= 0:
+        from_ = max(from_, last + 1 + int(NEAREST * period))
+    part = recent[from_ - base : int(centre + 0.5 * period) + 1 - base]
+    return from_ + part.index(max(part)) if part else base + len(recent)

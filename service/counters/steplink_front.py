@@ -31,6 +31,8 @@ from service.samples import GRID_HZ
 SENSED: Final = 5
 """Integers of a row that the network sees."""
 ROW: Final = 9
+ROUGHNESS: Final = 4
+"""Where it stands in a row."""
 EVERY: Final = 2
 """Grid samples a row."""
 

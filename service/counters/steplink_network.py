@@ -42,6 +42,10 @@ BIAS_LIMIT: Final = 1_000_000.0
 
 Values = NDArray[np.float32]
 
+_NONE: Final = np.float32(0.0)
+_MOST: Final = np.float32(LIMIT)
+_POOLED: Final = np.float32(POOLED)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layer:
@@ -80,7 +84,10 @@ LAYERS: Final = (FIRST, *FAST, *SLOW, LAST)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weights:
-    """Integer weights of every layer, (taps × inputs) × outputs, oldest tap first, and its biases."""
+    """Weights of every layer, (taps × inputs) × outputs, oldest tap first, and its biases.
+
+    Integers, divided by the power of two that makes integers of 1/UNIT of what a layer gives: as exact as they were.
+    """
 
     kernels: Sequence[Values]
     biases: Sequence[Values]
@@ -94,9 +101,17 @@ def weights_of(arrays: Mapping[str, NDArray[np.generic]]) -> Weights:
         wanted = (layer.taps * layer.inputs, layer.outputs)
         if kernel.shape != wanted or bias.shape != wanted[1:]:
             raise ValueError(f"layer {i} is {kernel.shape}, {wanted} is wanted")
-        kernels.append(np.ascontiguousarray(kernel, dtype=np.float32))
-        biases.append(np.ascontiguousarray(bias, dtype=np.float32))
+        unit = np.float32(scale(i))
+        kernels.append(np.ascontiguousarray(kernel, dtype=np.float32) * unit)
+        biases.append(np.ascontiguousarray(bias, dtype=np.float32) * unit)
     return Weights(kernels, biases)
+
+
+def scale(i: int) -> float:
+    """Return what makes integers of 1/UNIT of a layer's sums; the last one's stay sums."""
+    if i == len(LAYERS) - 1:
+        return 1.0
+    return UNIT / (front.UNIT * WEIGHT_UNIT) if i == 0 else 1.0 / WEIGHT_UNIT
 
 
 def fresh_past() -> list[Values]:
@@ -107,19 +122,19 @@ def fresh_past() -> list[Values]:
 def run(weights: Weights, rows: Values, past: list[Values]) -> Values:
     """Return frames × 2 logits of 1/(UNIT × WEIGHT_UNIT) for frames × FRAME_ROWS × SENSED integers; `past` goes on."""
     frames = len(rows)
-    x = _layer(weights, 0, rows.reshape(frames * FRAME_ROWS, front.SENSED), past, UNIT / (front.UNIT * WEIGHT_UNIT))
+    x = _layer(weights, 0, rows.reshape(frames * FRAME_ROWS, front.SENSED), past)
     x = np.maximum(x[0::2], x[1::2])
     for i in range(1, 1 + len(FAST)):
         x = _layer(weights, i, x, past)
     x = x.reshape(frames, POOLED, WIDE)
-    x = np.concatenate((np.rint(x.sum(axis=1) / np.float32(POOLED)), x.max(axis=1)), axis=1)
+    x = np.concatenate((np.rint(x.sum(axis=1) / _POOLED), x.max(axis=1)), axis=1)
     for i in range(1 + len(FAST), len(LAYERS) - 1):
         x = _layer(weights, i, x, past)
     z: Values = x @ weights.kernels[-1] + weights.biases[-1]
     return z
 
 
-def _layer(weights: Weights, i: int, x: Values, past: list[Values], scale: float = 1.0 / WEIGHT_UNIT) -> Values:
+def _layer(weights: Weights, i: int, x: Values, past: list[Values]) -> Values:
     layer = LAYERS[i]
     whole = np.concatenate((past[i], x))
     n = len(x)
@@ -127,10 +142,9 @@ def _layer(weights: Weights, i: int, x: Values, past: list[Values], scale: float
     past[i] = whole[n:]
     y: Values = np.concatenate(seen, axis=1) @ weights.kernels[i]
     y += weights.biases[i]
-    y *= np.float32(scale)
     np.rint(y, out=y)
-    np.maximum(y, 0.0, out=y)
+    np.maximum(y, _NONE, out=y)
     if layer.adds:
         y += x
-    np.minimum(y, np.float32(LIMIT), out=y)
+    np.minimum(y, _MOST, out=y)
     return y

@@ -1,9 +1,9 @@
 """The exact cadence of steplink's counter: the network knows it roughly, autocorrelation knows it well.
 
 Once a frame, over the last WINDOW rows of the front end (4.16 s): r_m is the autocorrelation of the magnitude, r_t that
-of the three axes together, normalised and unbiased. For 41 factors q from 0.75 to 1.33, T = 1/(c q), c being the
-network's cadence, S(q) = (r_m(T) + r_m(2T) + r_t(2T))/3; where S − 3 ln² q is greatest, off both ends and with S above
-0.3, c q is the cadence. Twice T, since one foot differs from the other and an arm swings once in two steps.
+of the three axes together, normalised and unbiased. For 61 factors q from 0.6 to 1.5, T = 1/(c q), c being the
+network's cadence, S(q) = (r_m(T) + r_m(2T) + r_t(2T))/3; where S − 2 ln² q is greatest, off both ends and with S above
+0.35, c q is the cadence. Twice T, since one foot differs from the other and an arm swings once in two steps.
 
 The rows are integers, so each sum of products is exact and its bits are the same whichever way it is found.
 """
@@ -31,12 +31,18 @@ SPAN_HZ: Final = 3.2
 """The network's cadence is SLOWEST_HZ + SPAN_HZ σ(z − 0.5)."""
 LOGIT: Final = 1.0 / (UNIT * WEIGHT_UNIT)
 
-FACTORS: Final = 0.75 * (1.33 / 0.75) ** (np.arange(41) / 40.0)
-COSTS: Final = 3.0 * np.log(FACTORS) ** 2
-ACCEPTED: Final = 0.3
+FACTORS: Final = 0.6 * (1.5 / 0.6) ** (np.arange(61) / 60.0)
+COSTS: Final = 2.0 * np.log(FACTORS) ** 2
+ACCEPTED: Final = 0.35
 
 Floats = NDArray[np.float64]
 
+TRANSFORM: Final = 256
+"""Values of the Fourier transform: more than WINDOW + LAGS, so that nothing wraps around."""
+
+_PERIODS: Final = np.concatenate((1.0 / FACTORS, 2.0 / FACTORS, 2.0 / FACTORS))
+"""Lags of r_m(T), r_m(2T), r_t(2T), as shares of the rough period; and where each correlation begins."""
+_FIRST: Final = np.repeat((0, 0, LAGS), len(FACTORS))
 _UNBIASED: Final = WINDOW / (WINDOW - np.arange(LAGS, dtype=np.float64))
 
 
@@ -45,37 +51,40 @@ def cadence_hz(z: float) -> float:
     return SLOWEST_HZ + SPAN_HZ / (1.0 + exp(0.5 - z * LOGIT))
 
 
-def windows(rows: Floats) -> Floats:
-    """Return frames × WINDOW × COLUMNS; `rows` begin WINDOW − FRAME_ROWS rows before the first frame does."""
-    frames = (len(rows) - WINDOW) // FRAME_ROWS + 1
-    by_row, by_column = rows.strides
+def windows(columns: Floats) -> Floats:
+    """Return frames × COLUMNS × WINDOW; `columns` begin WINDOW − FRAME_ROWS rows before the first frame does."""
+    frames = (columns.shape[1] - WINDOW) // FRAME_ROWS + 1
+    by_column, by_row = columns.strides
     return np.lib.stride_tricks.as_strided(
-        rows, (frames, WINDOW, COLUMNS), (by_row * FRAME_ROWS, by_row, by_column), writeable=False
+        columns, (frames, COLUMNS, WINDOW), (by_row * FRAME_ROWS, by_column, by_row), writeable=False
     )
 
 
 def correlations(seen: Floats) -> Floats:
-    """Return frames × 2 × LAGS of r_m and r_t for frames × WINDOW × COLUMNS integers."""
-    level = seen - np.rint(seen.sum(axis=1) / WINDOW)[:, None]
-    spectrum = np.fft.rfft(level, 2 * WINDOW, axis=1)
+    """Return frames × 2 × LAGS of r_m and r_t for frames × COLUMNS × WINDOW integers."""
+    level = seen - np.rint(seen.sum(axis=2) / WINDOW)[:, :, None]
+    spectrum = np.fft.rfft(level, TRANSFORM)
     power = spectrum.real * spectrum.real + spectrum.imag * spectrum.imag
-    both = np.stack((power[:, :, 0], power[:, :, 1] + power[:, :, 2] + power[:, :, 3]), axis=1)
-    sums = np.rint(np.fft.irfft(both, 2 * WINDOW)[:, :, :LAGS])
+    power[:, 1] += power[:, 2]
+    power[:, 1] += power[:, 3]
+    sums = np.rint(np.fft.irfft(power[:, :2], TRANSFORM)[:, :, :LAGS])
     ratio: Floats = sums / np.maximum(sums[:, :, :1], 1.0)
-    return ratio * _UNBIASED
+    ratio *= _UNBIASED
+    return ratio
 
 
 def refined_hz(rough_hz: Floats, r: Floats) -> Floats:
     """Return the cadence that `correlations` have near each frame's `rough_hz`; that itself where they have none."""
-    lag = ROWS_HZ / (rough_hz[:, None] * FACTORS)
-    lags = np.concatenate((lag, 2.0 * lag, 2.0 * lag), axis=1)
-    whole = np.minimum(lags.astype(np.intp), LAGS - 2)
-    first = np.repeat((0, 0, LAGS), len(FACTORS)) + 2 * LAGS * np.arange(len(r))[:, None]
-    flat, at = r.ravel(), first + whole
+    lags = (ROWS_HZ / rough_hz)[:, None] * _PERIODS
+    whole = np.minimum(lags, LAGS - 2.0).astype(np.intp)
+    at = whole + _FIRST
+    if len(r) > 1:
+        at += 2 * LAGS * np.arange(len(r))[:, None]
+    flat = r.ravel()
     before = flat[at]
-    values = np.where(lags < LAGS - 1, before + (flat[at + 1] - before) * (lags - whole), 0.0)
-    k = len(FACTORS)
-    s = (values[:, :k] + values[:, k : 2 * k] + values[:, 2 * k :]) / 3.0
-    best = np.argmax(s - COSTS, axis=1)
-    accepted = (best > 0) & (best < k - 1) & (s[np.arange(len(s)), best] > ACCEPTED)
+    values = before + (flat[at + 1] - before) * (lags - whole)
+    values[lags >= LAGS - 1] = 0.0
+    s = values.reshape(-1, 3, len(FACTORS)).sum(axis=1) / 3.0
+    best = (s - COSTS).argmax(axis=1)
+    accepted = (best > 0) & (best < len(FACTORS) - 1) & (s[np.arange(len(s)), best] > ACCEPTED)
     return np.where(accepted, rough_hz * FACTORS[best], rough_hz)

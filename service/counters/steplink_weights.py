@@ -136,8 +136,8 @@ def packed(arrays: Mapping[str, NDArray[np.integer[Any]]], about: Mapping[str, A
 def digest(weights: network.Weights) -> str:
     """Return what tells these weights from others, in 12 letters."""
     hashed = hashlib.sha256()
-    for values in (*weights.kernels, *weights.biases):
-        hashed.update(np.ascontiguousarray(values, dtype="<i4").tobytes())
+    for values in integers(weights).values():
+        hashed.update(values.astype("<i4").tobytes())
     return hashed.hexdigest()[:DIGEST_LENGTH]
 
 
@@ -145,7 +145,8 @@ def integers(weights: network.Weights) -> dict[str, NDArray[np.int32]]:
     """Return the arrays that `packed` takes."""
     out: dict[str, NDArray[np.int32]] = {}
     for i, (kernel, bias) in enumerate(zip(weights.kernels, weights.biases, strict=True)):
-        out[f"kernel{i}"], out[f"bias{i}"] = kernel.astype(np.int32), bias.astype(np.int32)
+        unit = np.float32(network.scale(i))
+        out[f"kernel{i}"], out[f"bias{i}"] = (kernel / unit).astype(np.int32), (bias / unit).astype(np.int32)
     return out
 
 

@@ -133,6 +133,7 @@ def _recipe(about: Mapping[str, Any], teaching: Sequence[Material]) -> str:
         batch=recipe.BATCH,
         rate=f"{recipe.HIGHEST_RATE:g}",
         decay=f"{recipe.DECAY:g}",
+        averaged=f"{100 * recipe.AVERAGED:g}",
         exact=f"{100 * (1 - recipe.EXACT_FROM):g}",
         clip_s=f"{CLIP / GRID_HZ:g}",
         range_g=f"{motion.FULL_SCALE_G:g}",

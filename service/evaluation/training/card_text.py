@@ -48,10 +48,12 @@ AdamW, one cycle of the learning rate up to {rate}, weight decay {decay}, {batch
 pieces of recordings one after the other, so that motion without a step stands between walks. The loss: cross-entropy of
 walking where that is known, distance of the steps a second where step times are, and where only the number of steps is
 known its relative error. During the last {exact} % of the steps, weights and everything between layers are rounded to
-the integers that the counter computes with.
+the integers that the counter computes with. What ships is their running mean (of which {averaged} % stays at each
+step).
 
-Each piece is changed at random: pace, orientation, gain and offset of axes, noise, rate ({rates} Hz), resolution, a
-range of ±{range_g} g, stretches lost; and recordings at the body are hung on a synthetic arm that swings.
+Each piece is changed at random: pace and strength, orientation, gain and offset of axes, noise, the rattle of a loose
+strap, rate ({rates} Hz), resolution, a range of ±{range_g} g, stretches lost; and recordings at the body are hung on a
+synthetic arm that swings.
 
 How often a piece is of a source:
 """

@@ -30,6 +30,8 @@ CLIP_FRAMES: Final = 250
 CLIP: Final = CLIP_FRAMES * FRAME
 SPANS: Final = 4
 """Recordings of known number in one clip."""
+SMOOTH_SHARE: Final = 0.15
+"""Clips whose roughness is made less, or nothing."""
 PAUSE_S: Final = 1.6
 """Steps farther apart are of two walks."""
 HALF_CLIP: Final = CLIP // 2
@@ -108,7 +110,7 @@ class Sampler:
 
     def _add(self, made: _Label, one: Material) -> None:
         rng = self.rng
-        factor = float(np.exp(rng.uniform(np.log(0.78), np.log(1.28)))) if rng.random() < 0.8 else 1.0
+        factor, strength = motion.pace(rng)
         counted = one.step_s is None and one.true_steps > 0
         acc_g, step_s = one.acc_g, np.empty(0) if one.step_s is None else one.step_s
         number, weight = float(one.true_steps), 1.0 if one.trusted else 0.4
@@ -126,6 +128,8 @@ class Sampler:
                 step_s = step_s[inside] - begin / GRID_HZ
         if one.step_s is not None and one.source != SYNTHETIC and not one.at_wrist and rng.random() < 0.5:
             acc_g = motion.with_arm_swing(acc_g, step_s, rng)
+        if strength != 1.0:
+            acc_g = motion.strengthened(acc_g, strength)
         if factor != 1.0:
             acc_g, step_s = motion.stretched(acc_g, factor), step_s / factor
         acc_g = acc_g[: made.left()]
@@ -184,8 +188,11 @@ class Sampler:
             span[k, first // FRAME : -(-last // FRAME)] = 1.0
             number[k], counted[k] = true, w
         weight[frames:] = 0.0
+        rows = rows_of(acc_g, total)
+        if self.rng.random() < SMOOTH_SHARE:
+            rows[:, :, front.ROUGHNESS] *= self.rng.random() < 0.5 and self.rng.random()
         return Clip(
-            rows=rows_of(acc_g, total),
+            rows=rows,
             walking=walking,
             walking_weight=weight,
             density=density,

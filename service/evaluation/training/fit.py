@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from service.evaluation.training import model
 from service.evaluation.training.clips import Clip, Sampler
-from service.evaluation.training.recipe import BATCH, DECAY, EXACT_FROM, HIGHEST_RATE, STEPS
+from service.evaluation.training.recipe import AVERAGED, BATCH, DECAY, EXACT_FROM, HIGHEST_RATE, STEPS
 
 FIELDS: Final = tuple(Clip.__dataclass_fields__)
 
@@ -48,7 +48,7 @@ def course(
     rate: float = HIGHEST_RATE,
     exact_from: float = EXACT_FROM,
 ) -> Iterator[tuple[int, float, model.Params]]:
-    """Yield each step's number from 1 on, the loss before it and the weights after it, in plain units.
+    """Yield each step's number from 1 on, the loss before it and the running mean of the weights, in plain units.
 
     Rounding begins after the share `exact_from` of the steps.
     """
@@ -56,12 +56,20 @@ def course(
     schedule = optax.cosine_onecycle_schedule(steps, rate, pct_start=0.2)
     optimiser = optax.chain(optax.clip_by_global_norm(1.0), optax.adamw(schedule, weight_decay=DECAY))
     state = optimiser.init(params)
+    average = params
     advance = {exact: jax.jit(partial(_advance, optimiser, exact)) for exact in (False, True)}
     key = jax.random.PRNGKey(seed)
     for number, clips in enumerate(batches(sampler, steps)):
         key, now = jax.random.split(key)
         params, state, value = advance[number >= exact_from * steps](params, state, clips, now)
-        yield number + 1, float(value), params
+        average = mean(average, params, min(AVERAGED, number / (number + 10.0)))
+        yield number + 1, float(value), average
+
+
+@jax.jit
+def mean(average: Any, params: Any, share: float) -> Any:  # noqa: ANN401
+    """Return the running mean of the weights."""
+    return jax.tree.map(lambda old, new: share * old + (1.0 - share) * new, average, params)
 
 
 def _advance(optimiser: Any, exact: bool, params: Any, state: Any, clips: Any, key: Any) -> Any:  # noqa: ANN401

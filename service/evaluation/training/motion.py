@@ -27,6 +27,27 @@ def stretched(acc_g: Floats, factor: float) -> Floats:
     return _at(acc_g, np.linspace(0.0, n - 1, m))
 
 
+def pace(rng: Rng) -> tuple[float, float]:
+    """Return how much faster a motion is to be, and how much stronger: a walk becomes a slow one, a fast one or a run.
+
+    Most stay near what they were. What is much faster is stronger, as in a run, and what is much slower is weaker.
+    """
+    kind = rng.random()
+    if kind < 0.2:
+        return 1.0, 1.0
+    if kind < 0.72:
+        return float(np.exp(rng.uniform(np.log(0.78), np.log(1.28)))), 1.0
+    if kind < 0.84:
+        return rng.uniform(1.28, 1.7), rng.uniform(1.3, 3.0)
+    return rng.uniform(0.5, 0.78), rng.uniform(0.4, 1.0)
+
+
+def strengthened(acc_g: Floats, factor: float) -> Floats:
+    """Return it with all that is not its mean `factor` times as strong."""
+    mean = acc_g.mean(axis=0)
+    return np.asarray(mean + (acc_g - mean) * factor)
+
+
 def _at(acc_g: Floats, places: Floats) -> Floats:
     base = np.clip(places.astype(np.intp), 0, len(acc_g) - 2)
     part = (places - base)[:, None]
@@ -112,6 +133,17 @@ def _swing(t_s: Floats, step_s: Floats, rng: Rng) -> Floats:
     return np.asarray(size * drift * eased * shape + bend)
 
 
+def roughened(acc_g: Floats, rng: Rng) -> Floats:
+    """Return it with the rattle of a loose strap or pocket: noise, strong where the motion is.
+
+    Wearables of 12.5 to 32 Hz measure none, and without it their walks would teach that a walk has none.
+    """
+    strength = np.abs(np.diff(acc_g, axis=0, prepend=acc_g[:1])).sum(axis=1, keepdims=True)
+    return np.asarray(
+        acc_g + np.exp(rng.uniform(np.log(0.05), np.log(0.8))) * strength * rng.standard_normal(acc_g.shape)
+    )
+
+
 def as_sensed(acc_g: Floats, rng: Rng) -> Floats:
     """Return it as another sensor would have given it: gain, offset, noise, rate, bits, range, frozen stretches."""
     out = acc_g * (1.0 + 0.08 * rng.standard_normal()) if rng.random() < 0.5 else acc_g
@@ -119,6 +151,8 @@ def as_sensed(acc_g: Floats, rng: Rng) -> Floats:
         out = out * (1.0 + 0.03 * rng.standard_normal(3)) + 0.03 * rng.standard_normal(3)
     if rng.random() < 0.3:
         out = at_rate(out, float(rng.choice(RATES_HZ)), rng)
+    if rng.random() < 0.35:
+        out = roughened(out, rng)
     if rng.random() < 0.5:
         out = out + rng.uniform(0.0, 0.03) * rng.standard_normal(out.shape)
     if rng.random() < 0.3:

@@ -10,6 +10,8 @@ HIGHEST_RATE: Final = 4e-3
 DECAY: Final = 1e-3
 EXACT_FROM: Final = 0.5
 """Share of the steps after which rounding begins."""
+AVERAGED: Final = 0.99
+"""Share of the running mean of the weights that stays at each step; the mean is what ships."""
 
 WEARERS: Final = 24
 """Synthetic walkers that teach beside the recordings."""
