@@ -29,9 +29,7 @@ from service.samples import GRID_HZ
 DATA_HEAD: Final = ("set", "holds", "from", "licence", "recordings", "minutes", "steps", "learnt from")
 POOL_HEAD: Final = ("source", "of it", "share")
 KINDS: Final = {"walk": "walks", "still": "no steps", "doubt": "none, perhaps a hidden step"}
-SYNTHETIC_SHARE: Final = {pool: share for pool, share in WEIGHTS.items() if pool.startswith(SYNTHETIC)}
 SECONDS_PER_MINUTE: Final = 60.0
-UNKNOWN: Final = "not recorded in the file"
 
 Line = tuple[str, ...]
 
@@ -123,13 +121,11 @@ def _described(name: str, figures: Line) -> Line:
 
 
 def _recipe(about: Mapping[str, Any], teaching: Sequence[Material]) -> str:
-    drawn = shares(teaching) | SYNTHETIC_SHARE
-    pools = [_pool(pool, share / sum(drawn.values())) for pool, share in drawn.items()]
+    walks = f"{SYNTHETIC}/walk"
+    drawn = shares(teaching) | {walks: WEIGHTS[walks]}
+    pools = [_pool(pool, share / sum(drawn.values())) for pool, share in sorted(drawn.items()) if share]
     told = RECIPE.format(
-        steps=about.get("steps", UNKNOWN),
-        seed=about.get("seed", UNKNOWN),
-        loss=about.get("loss", UNKNOWN),
-        versions=", ".join(f"{name} {version}" for name, version in about.get("versions", {}).items()) or UNKNOWN,
+        made=_made(about),
         batch=recipe.BATCH,
         rate=f"{recipe.HIGHEST_RATE:g}",
         decay=f"{recipe.DECAY:g}",
@@ -142,6 +138,13 @@ def _recipe(about: Mapping[str, Any], teaching: Sequence[Material]) -> str:
     return f"{told.strip()}\n\n{_table(POOL_HEAD, pools)}"
 
 
+def _made(about: Mapping[str, Any]) -> str:
+    if not about:
+        return "How many steps, with which seed and versions these weights took is not recorded in their file."
+    versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
+    return f"Steps {about['steps']}, seed {about['seed']}, mean loss of the last of them {about['loss']}; {versions}."
+
+
 def _pool(pool: str, share: float) -> Line:
     name, _, kind = pool.partition("/")
     return f"`{name}`", KINDS.get(kind, kind), f"{100.0 * share:.0f} %"
@@ -152,8 +155,8 @@ def _figures(measured: Sequence[Validation]) -> str:
         return NOT_MEASURED
     parts = [ABOUT_FIGURES.strip("\n")]
     for each in measured:
-        seeds = ", ".join(map(str, each.outcomes))
-        parts.append(f"### {each.title}\n\nSeeds: {seeds}.\n\n{_table(validation.HEAD, each.lines())}")
+        seeds = f"Seeds {', '.join(map(str, each.outcomes))}.\n\n" if len(each.outcomes) > 1 else ""
+        parts.append(f"### {each.title}\n\n{seeds}{_table(validation.HEAD, each.lines())}")
         parts += [
             f"Of `{name}`, whose wearers knew their steps within limits, {share.within} of {share.recordings} counts"
             f" ({share.percent:.0f} %) lie within them."

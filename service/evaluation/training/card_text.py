@@ -42,7 +42,7 @@ were learnt from.
 """
 
 RECIPE: Final = """\
-Steps {steps}, seed {seed}, mean loss of the last of them {loss}; {versions}.
+{made}
 
 AdamW, one cycle of the learning rate up to {rate}, weight decay {decay}, {batch} clips of {clip_s} s a step. A clip is
 pieces of recordings one after the other, so that motion without a step stands between walks. The loss: cross-entropy of

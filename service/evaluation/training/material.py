@@ -46,6 +46,7 @@ WEIGHTS: Final = {
     "negatives_banglejs/still": 0.05,
     "pebble_wrist/still": 0.08,
     "device_sim/walk": 0.05,
+    "device_sim/still": 0.05,
 }
 """How often a piece of a clip is of a pool: half of the walks of the wrist, and all that was hard to refuse often."""
 

@@ -207,7 +207,8 @@ def counted(one: Material, weights: Weights) -> int:
 
 
 def shares(material: Sequence[Material]) -> dict[str, float]:
-    """Return how often clips take from each pool: as WEIGHTS says, OTHERS of a pool that is not named there."""
+    """Return how often clips take from each pool: as WEIGHTS says, OTHERS of a source that is not named there."""
     from service.evaluation.training.clips import pool  # noqa: PLC0415  # numba: heavy
 
-    return {name: WEIGHTS.get(name, OTHERS) for name in map(pool, material)}
+    named = {name.partition("/")[0] for name in WEIGHTS}
+    return {pool(one): WEIGHTS.get(pool(one), 0.0 if one.source in named else OTHERS) for one in material}

@@ -106,6 +106,14 @@ KNOWN: Final = MappingProxyType(
         "voisard_lowback": Source(
             holds="lower back, walk and turn", origin="IPOL 2023/497", licence="AGPL-3.0, which does not suit"
         ),
+        "oxford_opt_B": Source(
+            holds="as oxford_opt, and a swinging hand", origin="as oxford_opt", licence="CC BY 4.0", group="oxford_opt"
+        ),
+        "sensorwatch_magonly": Source(
+            holds="wrist, magnitude only: very slow to fast walks; desk, dishwasher, dressing",
+            origin="rieck/stepcounter-devel",
+            licence="MIT",
+        ),
         SYNTHETIC: Source(
             holds="wrist, synthetic walks", origin="`device_sim` of this project", licence="as this project's"
         ),

@@ -62,7 +62,7 @@ def test_figures_are_those_that_were_measured(text):
 def test_what_was_not_measured_is_said_to_be_so():
     made = card.text("abc123", {}, [material()], [], [], [])
     assert "Nothing was measured" in made
-    assert f"Steps {card.UNKNOWN}" in made
+    assert "is not recorded in their file" in made
 
 
 def test_limits_come_from_the_code_and_the_data(text):

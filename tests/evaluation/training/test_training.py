@@ -9,7 +9,7 @@ from service.counters import steplink_weights
 from service.errors import TrainingError
 from service.evaluation import choices
 from service.evaluation.training import runs, scratch, sources, tuning, weights_file
-from service.evaluation.training.material import SYNTHETIC, synthetic
+from service.evaluation.training.material import OTHERS, SYNTHETIC, WEIGHTS, synthetic
 
 pytestmark = pytest.mark.full
 
@@ -104,3 +104,16 @@ def test_a_fold_counts_what_it_was_not_taught(trained):
     plan = scratch.plan([material(subject="a"), material(subject="b")], [], wanted=["subjects"], steps=8)
     assert [set(one.taught).isdisjoint(one.held) for one in plan.runs] == [True] * 3
     assert set(trained.kept[-1].counted) == set(trained.run.held)
+
+
+def test_pools_are_drawn_as_the_recipe_says_and_own_ones_with_them():
+    of = [
+        material("pebble_wrist"),
+        material("pebble_wrist", true_steps=0, trusted=False),  # no pool of the recipe
+        material("mine", true_steps=0),
+    ]
+    assert runs.shares(of) == {
+        "pebble_wrist/walk": WEIGHTS["pebble_wrist/walk"],
+        "pebble_wrist/doubt": 0.0,
+        "mine/still": OTHERS,
+    }
