@@ -219,6 +219,7 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         help="let counters learn before they count: `middle`, each recording from its own middle 300 samples"
         " (double_threshold), or a file, a calibration walk (double_threshold, gyro_zero_crossing: as slow as ever)",
     )
+    _add_weights(parser)
     _add_json(parser, "write a row for each recording and counter there")
     parser.add_argument(
         "--paper",
@@ -269,6 +270,7 @@ def _add_scorecard(parser: argparse.ArgumentParser) -> None:
 def add_bench(parser: argparse.ArgumentParser) -> None:
     """Add what `bench` takes."""
     _add_counter(parser, "counters to measure, or all (default all)")
+    _add_weights(parser)
     _add_json(parser, "write a list of {name, value, unit} there")
     parser.add_argument(
         "--samples",
@@ -280,6 +282,11 @@ def add_bench(parser: argparse.ArgumentParser) -> None:
 
 def _add_counter(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--counter", nargs="+", action="extend", default=[], metavar="NAME", help=text)
+
+
+def _add_weights(parser: argparse.ArgumentParser) -> None:
+    (field,) = (field for field in dataclasses.fields(Settings) if field.name == "weights")
+    parser.add_argument("--weights", metavar="FILE", default="", help=field.metadata["text"])
 
 
 def _add_json(parser: argparse.ArgumentParser, text: str) -> None:

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from math import exp, log
 from typing import Final
 
@@ -22,6 +20,7 @@ from service.counters import steplink_bouts as bouts
 from service.counters import steplink_front as front
 from service.counters import steplink_network as network
 from service.counters import steplink_rhythm as rhythm
+from service.counters import steplink_weights
 from service.counters.contract import Snapshot, check_snapshot, ordered, parameter, params_hash
 from service.counters.streaming import COMPILED_FROM
 from service.samples import GRID_HZ, Column, Columns, Gait, Likely, SampleBlock, Sensor, Step, Update, Verdict
@@ -61,8 +60,17 @@ class SteplinkParams:
 TUNED: Final = SteplinkParams()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Built:
+    """What a snapshot must have been made with."""
+
+    params: SteplinkParams
+    weights: str
+    """Their digest."""
+
+
 class SteplinkCounter:
-    """steplink's counter over the grid; see the contract. `weights` are the shipped ones unless others are given."""
+    """steplink's counter over the grid; see the contract. `weights` are those in use unless others are given."""
 
     name = NAME
     version = VERSION
@@ -72,7 +80,8 @@ class SteplinkCounter:
     def __init__(self, params: SteplinkParams = TUNED, weights: network.Weights | None = None) -> None:
         self.params = params
         self.latency_s = latency_s(params)
-        self._weights = shipped() if weights is None else weights
+        self._weights = steplink_weights.in_use() if weights is None else weights
+        self._built = _Built(params=params, weights=steplink_weights.digest(self._weights))
         self._front = front.fresh()
         self._bouts = _fresh_bouts(params)
         self._past = network.fresh_past()
@@ -113,11 +122,11 @@ class SteplinkCounter:
             "rows": list(self._rows),
             "rhythm": self._rhythm.ravel().tolist(),
         }
-        return {"counter": self.name, "version": self.version, "params": params_hash(self.params), "state": state}
+        return {"counter": self.name, "version": self.version, "params": params_hash(self._built), "state": state}
 
     def restore(self, state: Snapshot) -> None:
         """Take over a snapshot's state; SnapshotError where it is another counter's."""
-        check_snapshot(state, name=self.name, version=self.version, params=self.params)
+        check_snapshot(state, name=self.name, version=self.version, params=self._built)
         kept = state["state"]
         self._front[front.CONSTANTS :] = map(float, kept["front"])
         self._bouts[bouts.CONSTANTS :] = map(float, kept["bouts"])
@@ -260,13 +269,6 @@ def latency_s(p: SteplinkParams) -> float:
     """Return the longest time from a step to its confirmation: all that may wait, a frame, and its answer."""
     frames = p.patience + 1 + network.DELAY
     return (frames * bouts.FRAME + FILTER_DELAY) / GRID_HZ
-
-
-@cache
-def shipped() -> network.Weights:
-    """Return the weights that come with the package."""
-    with resources.files("service.counters").joinpath("steplink_weights.npz").open("rb") as file, np.load(file) as kept:
-        return network.weights_of(dict(kept))
 
 
 def _fresh_bouts(p: SteplinkParams) -> list[float]:

@@ -101,13 +101,13 @@ def weights_of(arrays: Mapping[str, NDArray[np.generic]]) -> Weights:
         wanted = (layer.taps * layer.inputs, layer.outputs)
         if kernel.shape != wanted or bias.shape != wanted[1:]:
             raise ValueError(f"layer {i} is {kernel.shape}, {wanted} is wanted")
-        scale = np.float32(_scale(i))
-        kernels.append(np.ascontiguousarray(kernel, dtype=np.float32) * scale)
-        biases.append(np.ascontiguousarray(bias, dtype=np.float32) * scale)
+        unit = np.float32(scale(i))
+        kernels.append(np.ascontiguousarray(kernel, dtype=np.float32) * unit)
+        biases.append(np.ascontiguousarray(bias, dtype=np.float32) * unit)
     return Weights(kernels, biases)
 
 
-def _scale(i: int) -> float:
+def scale(i: int) -> float:
     """Return what makes integers of 1/UNIT of a layer's sums; the last one's stay sums."""
     if i == len(LAYERS) - 1:
         return 1.0

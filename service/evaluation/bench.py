@@ -20,7 +20,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from service.counters import registry
+from service.counters import registry, steplink, steplink_weights
 from service.counters.contract import RecordingCounter, StepCounter
 from service.evaluation import yardsticks
 from service.evaluation.counting import grid_block, pieces, streamed
@@ -62,7 +62,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One measured value; units are `samples/s` of the 50 Hz grid, `us/packet` of ten samples, and `ratio`."""
+    """One measured value; units are `samples/s` of the 50 Hz grid, `us/packet` of ten samples, `ms` and `ratio`."""
 
     name: str
     value: float
@@ -78,6 +78,8 @@ def figures(counters: Sequence[str], samples: int = SAMPLES) -> Iterator[Figure]
         yield _live(f"{name} live", partial(registry.make, name), block)
         if name in PAPER_S:
             yield _paper(name, block)
+        if name == steplink.NAME:
+            yield Figure(name="model load", value=1e3 * best_s(steplink_weights.unpacked), unit="ms")
     yield _live_packets()
     if available():
         yield from _from_file(counters, yardsticks.head(block, samples // FILE_SHARE))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from device_sim.gait import Walker
-from service.counters import registry, steplink
+from service.counters import registry, steplink, steplink_weights
 from service.counters import steplink_bouts as bouts
 from service.counters import steplink_front as front
 from service.counters import steplink_network as network
@@ -117,7 +117,7 @@ def rows_of(values):
 
 
 def test_frames_alone_and_together_give_the_same_bits(rows):
-    weights = steplink.shipped()
+    weights = steplink_weights.shipped().weights
     sensed = rows[: len(rows) // 12 * 12, : front.SENSED].astype(np.float32).reshape(-1, 12, front.SENSED)
     past, one = network.fresh_past(), network.fresh_past()
     together = network.run(weights, sensed, past)
@@ -130,7 +130,7 @@ def test_frames_alone_and_together_give_the_same_bits(rows):
 @settings(max_examples=20, deadline=None)
 @given(sensed=hnp.arrays(np.float32, (3, 12, front.SENSED), elements=st.sampled_from([-1023.0, 0.0, 1.0, 1023.0])))
 def test_no_sum_of_the_network_is_too_large_to_be_exact(sensed):
-    weights = steplink.shipped()
+    weights = steplink_weights.shipped().weights
     exact = network.Weights(
         [kernel.astype(np.float64) for kernel in weights.kernels], [bias.astype(np.float64) for bias in weights.biases]
     )

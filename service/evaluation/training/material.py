@@ -6,17 +6,14 @@ truth is approximate, and weighs less.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from service.evaluation.choices import Found
 from service.evaluation.counting import grid_block
 from service.evaluation.training import motion
-from service.recordings import read
 from service.recordings.recording import Recording
 from service.samples import GRID_HZ
 
@@ -54,6 +51,7 @@ WEIGHTS: Final = {
     "negatives_banglejs/still": 0.05,
     "pebble_wrist/still": 0.08,
     "device_sim/walk": 0.07,
+    "device_sim/still": 0.05,
     "exercises/still": 0.13,
 }
 """How often a piece of a clip is of a pool: half of the walks of the wrist, and all that was hard to refuse often."""
@@ -79,6 +77,11 @@ class Material:
     true_steps: int
     step_s: Floats | None = None
     trusted: bool = True
+    recording: str = ""
+    """Its file's name, without the ending."""
+    quality: str | None = None
+    steps_range: tuple[int, int] | None = None
+    """What the number of steps may be, where that is all its wearer knew."""
 
     @property
     def duration_s(self) -> float:
@@ -91,15 +94,9 @@ class Material:
         return self.placement.startswith("wrist")
 
 
-def load(found: Sequence[Found]) -> list[Material]:
-    """Read recordings and put them on the grid; those without a true number of steps teach nothing and are left out."""
-    read_all = ((file, read(file.path)) for file in found)
-    return [material(file.dataset, recording) for file, recording in read_all if _true(recording) is not None]
-
-
 def material(source: str, recording: Recording) -> Material:
     """Return one recording as material; its true number of steps is known."""
-    true = _true(recording)
+    true = true_steps(recording)
     assert true is not None  # noqa: S101  # the caller has looked
     doubtful = recording.quality == "B" and not true and recording.duration_s < DOUBTFUL_S
     times = recording.step_t_s
@@ -112,10 +109,14 @@ def material(source: str, recording: Recording) -> Material:
         true_steps=true,
         step_s=None if times is None or not len(times) else times - recording.t_s[0],
         trusted=not doubtful,
+        recording=recording.path.stem,
+        quality=recording.quality,
+        steps_range=recording.steps_range,
     )
 
 
-def _true(recording: Recording) -> int | None:
+def true_steps(recording: Recording) -> int | None:
+    """Return how many steps a recording holds, None where it does not say."""
     if recording.true_steps is None and recording.step_t_s is not None:
         return len(recording.step_t_s)
     return recording.true_steps
