@@ -21,12 +21,14 @@ from service.evaluation.choices import Found
 from service.evaluation.training import folds, motion, recipe, sources, validation
 from service.evaluation.training.card_text import ABOUT_FIGURES, DIGEST_BEFORE, HEAD, LIMITS, NOT_MEASURED, RECIPE, USE
 from service.evaluation.training.clips import CLIP, PAUSE_S
-from service.evaluation.training.material import SYNTHETIC, WEIGHTS, Material
+from service.evaluation.training.material import EXERCISES, SYNTHETIC, WEIGHTS, Material
 from service.evaluation.training.runs import shares
 from service.evaluation.training.validation import Validation
 from service.samples import GRID_HZ
 
 DATA_HEAD: Final = ("set", "holds", "from", "licence", "recordings", "minutes", "steps", "learnt from")
+MADE: Final = (SYNTHETIC, EXERCISES)
+"""What is made up."""
 POOL_HEAD: Final = ("source", "of it", "share")
 KINDS: Final = {"walk": "walks", "still": "no steps", "doubt": "none, perhaps a hidden step"}
 SECONDS_PER_MINUTE: Final = 60.0
@@ -100,8 +102,8 @@ def _data(
         _described(name, (str(number), "", "", "no: kept for the end"))
         for name, number in sorted(Counter(file.dataset for file in apart).items())
     ]
-    if made := about.get("sources", {}).get(SYNTHETIC):
-        lines.append(_described(SYNTHETIC, (str(made), "", "", "yes")))
+    taught = about.get("sources", {})
+    lines += [_described(name, (str(taught[name]), "", "", "yes")) for name in MADE if name in taught]
     return f"{_table(DATA_HEAD, lines)}\n\n{sources.WHY}"
 
 
@@ -121,8 +123,7 @@ def _described(name: str, figures: Line) -> Line:
 
 
 def _recipe(about: Mapping[str, Any], teaching: Sequence[Material]) -> str:
-    walks = f"{SYNTHETIC}/walk"
-    drawn = shares(teaching) | {walks: WEIGHTS[walks]}
+    drawn = shares(teaching) | {pool: WEIGHTS[pool] for pool in (f"{SYNTHETIC}/walk", f"{EXERCISES}/still")}
     pools = [_pool(pool, share / sum(drawn.values())) for pool, share in sorted(drawn.items()) if share]
     told = RECIPE.format(
         made=_made(about),

@@ -16,7 +16,7 @@ from typing import Final
 from service.errors import ParameterError
 from service.evaluation.choices import Found
 from service.evaluation.scorecard import splits
-from service.evaluation.training.material import SYNTHETIC, UNSTATED, Material, material, true_steps
+from service.evaluation.training.material import EXERCISES, SYNTHETIC, UNSTATED, Material, material, true_steps
 from service.recordings import read
 
 AUXILIARY: Final = frozenset({"oxford_opt_B", "sensorwatch_magonly", "voisard_lowback"})
@@ -116,6 +116,11 @@ KNOWN: Final = MappingProxyType(
         ),
         SYNTHETIC: Source(
             holds="wrist, synthetic walks", origin="`device_sim` of this project", licence="as this project's"
+        ),
+        EXERCISES: Source(
+            holds="wrist, synthetic arm motion without a step, a minute each",
+            origin="`motion.exercise` of this project",
+            licence="as this project's",
         ),
     }
 )

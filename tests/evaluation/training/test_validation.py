@@ -29,6 +29,7 @@ def trained(run, arrays, share):
 def laid(monkeypatch):
     """Two sources of two people each and an unseen one, both cross-validations with two seeds."""
     monkeypatch.setattr(scratch, "synthetic", lambda *_, seed: [material("device_sim", str(seed))])
+    monkeypatch.setattr(scratch, "exercises", lambda *_, seed: [material("exercises", str(seed))])
     teaching = [material(source, subject) for source in ("dcaiti", "pebble_wrist") for subject in "ab"]
     unseen = [material("eth2022_wrist", "x", steps_range=(20, 41))]
     return scratch.plan(teaching, unseen, wanted=["sources", "subjects"], steps=9, seed=3, seeds=2)
@@ -36,12 +37,12 @@ def laid(monkeypatch):
 
 def test_every_run_is_planned(laid):
     first, *others = laid.runs
-    assert first.taught == (0, 1, 2, 3, 4)
-    assert first.held == (5,)
+    assert first.taught == (0, 1, 2, 3, 4, 5)
+    assert first.held == (6,)
     assert laid.kinds == ["sources"] * 4 + ["subjects"] * 8
     assert {run.seed for run in others} == {3, 4}
     assert first.seed == 3
-    assert all(4 in run.taught and set(run.taught).isdisjoint(run.held) for run in laid.runs)
+    assert all({4, 5} <= set(run.taught) and set(run.taught).isdisjoint(run.held) for run in laid.runs)
 
 
 def test_figures_are_means_over_seeds_with_their_range(laid, arrays):
