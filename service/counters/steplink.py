@@ -36,8 +36,8 @@ FILTER_DELAY: Final = 2
 STILL_G: Final = 0.05
 """A frame whose magnitude ranges less is rest."""
 
-FRAMES_AT_ONCE: Final = 4096
-"""Of a whole recording: the network's values stay in the cache."""
+FRAMES_AT_ONCE: Final = 64
+"""Of a long block: more, and what the network computes with leaves the cache."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,10 +72,9 @@ class SteplinkCounter:
     def __init__(self, params: SteplinkParams = TUNED, weights: network.Weights | None = None) -> None:
         self.params = params
         self.latency_s = latency_s(params)
-        self._weights = shipped() if weights is None else weights
+        self._network = network.Stream(shipped() if weights is None else weights)
         self._front = front.fresh()
         self._bouts = _fresh_bouts(params)
-        self._past = network.fresh_past()
         self._rows: list[float] = []
         """Rows of the frame that is not complete."""
         self._rhythm = np.zeros((rhythm.COLUMNS, rhythm.WINDOW - network.FRAME_ROWS))
@@ -109,7 +108,7 @@ class SteplinkCounter:
         state = {
             "front": self._front[front.CONSTANTS :],
             "bouts": self._bouts[bouts.CONSTANTS :],
-            "past": [past.ravel().tolist() for past in self._past],
+            "past": self._network.past.tolist(),
             "rows": list(self._rows),
             "rhythm": self._rhythm.ravel().tolist(),
         }
@@ -121,10 +120,7 @@ class SteplinkCounter:
         kept = state["state"]
         self._front[front.CONSTANTS :] = map(float, kept["front"])
         self._bouts[bouts.CONSTANTS :] = map(float, kept["bouts"])
-        self._past = [
-            np.array(values, np.float32).reshape(past.shape)
-            for values, past in zip(kept["past"], network.fresh_past(), strict=True)
-        ]
+        self._network.past = np.array(kept["past"], np.float32)
         self._rows = list(map(float, kept["rows"]))
         self._rhythm = np.array(kept["rhythm"]).reshape(rhythm.COLUMNS, -1)
 
@@ -151,7 +147,7 @@ class SteplinkCounter:
         rows = self._close()
         front.begin(self._front, *(float(column[0]) for column in block.acc_g))
         bouts.begin(self._bouts, float(block.start))
-        self._past = network.fresh_past()
+        self._network.past = network.NOTHING
         self._rows = []
         self._rhythm = np.zeros_like(self._rhythm)
         return rows
@@ -206,26 +202,26 @@ class SteplinkCounter:
         rows = np.concatenate((np.array(self._rows), made))
         frames = len(rows) // frame
         self._rows = rows[frames * frame :].tolist()
-        rows = rows[: frames * frame].reshape(-1, front.ROW)
+        whole = rows[: frames * frame].reshape(-1, front.ROW)
         if frames <= FRAMES_AT_ONCE:
-            return self._judge(rows)
+            return self._judge(whole)
         size = FRAMES_AT_ONCE * network.FRAME_ROWS
-        parts = [self._judge(rows[first : first + size]) for first in range(0, len(rows), size)]
+        parts = [self._judge(whole[first : first + size]) for first in range(0, len(whole), size)]
         return [z for part, _ in parts for z in part], [c for _, part in parts for c in part]
 
     def _judge(self, rows: NDArray[np.float64]) -> tuple[list[float], list[float]]:
         """Return logit and cadence for whole frames of rows."""
-        sensed = rows[:, : front.SENSED].astype(np.float32).reshape(-1, network.FRAME_ROWS, front.SENSED)
-        logits = network.run(self._weights, sensed, self._past).tolist()
+        logits = self._network.run(rows[:, : front.SENSED]).tolist()
         walking = [z * rhythm.LOGIT for z, _ in logits]
         pace = [rhythm.cadence_hz(z) for _, z in logits]
         seen = np.concatenate((self._rhythm, rows[:, front.SENSED :].T), axis=1)
-        self._rhythm = seen[:, network.FRAME_ROWS * len(logits) :]
-        perhaps = [i for i, z in enumerate(walking) if z > self._bouts[bouts.LOW]]
+        self._rhythm = seen[:, len(rows) :]
+        low = self._bouts[bouts.LOW]
+        perhaps = [i for i, z in enumerate(walking) if z > low]
         if perhaps:
             r = rhythm.correlations(rhythm.windows(seen)[perhaps])
-            for i, exact in zip(perhaps, rhythm.refined_hz(np.array([pace[i] for i in perhaps]), r), strict=True):
-                pace[i] = float(exact)
+            for i, exact in zip(perhaps, rhythm.refined_hz([pace[i] for i in perhaps], r), strict=True):
+                pace[i] = exact
         return walking, pace
 
     def _likely(self) -> tuple[int, Sequence[Likely]]:
