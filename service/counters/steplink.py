@@ -77,7 +77,7 @@ class SteplinkCounter:
         self._bouts = _fresh_bouts(params)
         self._rows: list[float] = []
         """Rows of the frame that is not complete."""
-        self._rhythm = np.zeros((rhythm.COLUMNS, rhythm.WINDOW - network.FRAME_ROWS))
+        self._rhythm = rhythm.Windows()
         self._trace = [0.0] * 16
         self._made = [0.0] * (8 * front.ROW)
 
@@ -109,8 +109,8 @@ class SteplinkCounter:
             "front": self._front[front.CONSTANTS :],
             "bouts": self._bouts[bouts.CONSTANTS :],
             "past": self._network.past.tolist(),
-            "rows": list(self._rows),
-            "rhythm": self._rhythm.ravel().tolist(),
+            "rows": list(map(float, self._rows)),
+            "rhythm": self._rhythm.past.ravel().tolist(),
         }
         return {"counter": self.name, "version": self.version, "params": params_hash(self.params), "state": state}
 
@@ -122,7 +122,7 @@ class SteplinkCounter:
         self._bouts[bouts.CONSTANTS :] = map(float, kept["bouts"])
         self._network.past = np.array(kept["past"], np.float32)
         self._rows = list(map(float, kept["rows"]))
-        self._rhythm = np.array(kept["rhythm"]).reshape(rhythm.COLUMNS, -1)
+        self._rhythm.past = np.array(kept["rhythm"]).reshape(rhythm.COLUMNS, -1)
 
     def count(self, block: SampleBlock) -> NDArray[np.float64]:
         """Count a whole recording from a fresh state without making a Step of each; rows as in `steplink_bouts`."""
@@ -149,7 +149,7 @@ class SteplinkCounter:
         bouts.begin(self._bouts, float(block.start))
         self._network.past = network.NOTHING
         self._rows = []
-        self._rhythm = np.zeros_like(self._rhythm)
+        self._rhythm.past = np.zeros_like(self._rhythm.past)
         return rows
 
     def _close(self) -> list[float]:
@@ -199,7 +199,7 @@ class SteplinkCounter:
         if len(self._rows) + len(made) < frame:
             self._rows += list(made)
             return (), ()
-        rows = np.concatenate((np.array(self._rows), made))
+        rows = np.concatenate((self._rows, made)) if isinstance(made, np.ndarray) else np.array([*self._rows, *made])
         frames = len(rows) // frame
         self._rows = rows[frames * frame :].tolist()
         whole = rows[: frames * frame].reshape(-1, front.ROW)
@@ -214,12 +214,11 @@ class SteplinkCounter:
         logits = self._network.run(rows[:, : front.SENSED]).tolist()
         walking = [z * rhythm.LOGIT for z, _ in logits]
         pace = [rhythm.cadence_hz(z) for _, z in logits]
-        seen = np.concatenate((self._rhythm, rows[:, front.SENSED :].T), axis=1)
-        self._rhythm = seen[:, len(rows) :]
+        seen = self._rhythm.take(rows[:, front.SENSED :])
         low = self._bouts[bouts.LOW]
         perhaps = [i for i, z in enumerate(walking) if z > low]
         if perhaps:
-            r = rhythm.correlations(rhythm.windows(seen)[perhaps])
+            r = rhythm.correlations(seen if len(seen) == 1 else seen[perhaps])
             for i, exact in zip(perhaps, rhythm.refined_hz([pace[i] for i in perhaps], r), strict=True):
                 pace[i] = exact
         return walking, pace

@@ -15,6 +15,7 @@ from math import exp
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from service.counters import steplink_front as front
@@ -52,13 +53,32 @@ def cadence_hz(z: float) -> float:
     return SLOWEST_HZ + SPAN_HZ / (1.0 + exp(0.5 - z * LOGIT))
 
 
-def windows(columns: Floats) -> Floats:
-    """Return frames × COLUMNS × WINDOW; `columns` begin WINDOW − FRAME_ROWS rows before the first frame does."""
-    frames = (columns.shape[1] - WINDOW) // FRAME_ROWS + 1
-    by_column, by_row = columns.strides
-    return np.lib.stride_tricks.as_strided(
-        columns, (frames, COLUMNS, WINDOW), (by_row * FRAME_ROWS, by_column, by_row), writeable=False
-    )
+class Windows:
+    """The last WINDOW rows of a stream, kept from frame to frame."""
+
+    def __init__(self) -> None:
+        self._seen = np.zeros((1, COLUMNS, WINDOW))
+
+    @property
+    def past(self) -> Floats:
+        """COLUMNS × (WINDOW − FRAME_ROWS): what the next frame's window begins with."""
+        return self._seen[0, :, FRAME_ROWS:]
+
+    @past.setter
+    def past(self, columns: Floats) -> None:
+        self._seen[0, :, FRAME_ROWS:] = columns
+
+    def take(self, rows: Floats) -> Floats:
+        """Return frames × COLUMNS × WINDOW for (frames × FRAME_ROWS) × COLUMNS, to be read before more is taken."""
+        if len(rows) == FRAME_ROWS:
+            self._seen[0, :, :-FRAME_ROWS] = self._seen[0, :, FRAME_ROWS:]
+            self._seen[0, :, -FRAME_ROWS:] = rows.T
+            return self._seen
+        columns = np.concatenate((self.past, rows.T), axis=1)
+        self.past = columns[:, len(rows) :]
+        by_column, by_row = columns.strides
+        shape = (len(rows) // FRAME_ROWS, COLUMNS, WINDOW)
+        return as_strided(columns, shape, (by_row * FRAME_ROWS, by_column, by_row), writeable=False)
 
 
 def correlations(seen: Floats) -> Floats:
