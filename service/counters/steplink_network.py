@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
@@ -87,14 +88,25 @@ FRAMED_FROM: Final = 1 + len(FAST)
 """The first layer that sees frames."""
 
 
+PLACES: Final = (0, *accumulate((layer.taps * layer.inputs + 1) * layer.outputs for layer in LAYERS))
+"""Where the weights of each layer begin, and where the last one's end."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Weights:
-    """Weights of every layer, (taps × inputs) × outputs, oldest tap first, and its biases as one more row.
+    """Weights of every layer, (taps × inputs) × outputs, oldest tap first, then its biases; layer after layer.
 
     Integers, divided by the power of two that makes integers of 1/UNIT of what a layer gives: as exact as they were.
     """
 
-    kernels: Sequence[Values]
+    flat: Values
+
+    def kernels(self) -> list[Values]:
+        """Return the weights of each layer, the biases as a last row."""
+        return [
+            self.flat[first:last].reshape(-1, layer.outputs)
+            for layer, first, last in zip(LAYERS, PLACES, PLACES[1:], strict=False)
+        ]
 
 
 def weights_of(arrays: Mapping[str, NDArray[np.generic]]) -> Weights:
@@ -105,8 +117,8 @@ def weights_of(arrays: Mapping[str, NDArray[np.generic]]) -> Weights:
         wanted = (layer.taps * layer.inputs, layer.outputs)
         if kernel.shape != wanted or bias.shape != wanted[1:]:
             raise ValueError(f"layer {i} is {kernel.shape}, {wanted} is wanted")
-        kernels.append(np.vstack((kernel, bias)).astype(np.float32) * np.float32(_scale(i)))
-    return Weights(kernels)
+        kernels.append(np.vstack((kernel, bias)).astype(np.float32).ravel() * np.float32(_scale(i)))
+    return Weights(np.concatenate(kernels))
 
 
 def _scale(i: int) -> float:
@@ -143,31 +155,35 @@ class Stream:
     """The network along one stream, `frames` at a time, and what each layer remembers of those before."""
 
     def __init__(self, weights: Weights, frames: int = 1) -> None:
-        self._weights, self._frames = weights, frames
-        sizes = [(layer.reach + frames * values_a_frame(i)) * layer.inputs for i, layer in enumerate(LAYERS)]
-        ends = np.cumsum(sizes).tolist()
-        self._memory = np.zeros(ends[-1], np.float32)
-        inputs = [self._memory[end - size : end] for size, end in zip(sizes, ends, strict=True)]
-        self._stages = [_stage(i, kernel, inputs[i], frames) for i, kernel in enumerate(weights.kernels)]
-        firsts = [end - size for size, end in zip(sizes, ends, strict=True)]
-        self._past, lasts = _kept(firsts), _kept([end - layer.reach * layer.inputs for end, layer in zip(ends, LAYERS, strict=True)])
-        self._moved, self._moves = np.empty_like(self._memory), np.arange(ends[-1])
-        self._moves[self._past] = lasts
+        self.weights, self._frames = weights, frames
+        places = layout(frames)
+        self.memory = np.zeros(places[-1], np.float32)
+        """What goes into each layer, after what went in before; see `layout`."""
+        self._stages = [
+            _stage(i, kernel, self.memory[places[i] : places[i + 1]], frames)
+            for i, kernel in enumerate(weights.kernels())
+        ]
+        self._past = _kept(places[:-1])
+        self._moved, self.moves = np.empty_like(self.memory), np.arange(places[-1])
+        """What each place of memory holds after a frame: itself, or what has become past."""
+        self.moves[self._past] = _kept(
+            [end - layer.reach * layer.inputs for end, layer in zip(places[1:], LAYERS, strict=True)]
+        )
 
     @property
     def past(self) -> Values:
         """What each layer remembers, one after the other, oldest value first."""
-        return self._memory[self._past]
+        return self.memory[self._past]
 
     @past.setter
     def past(self, values: Values) -> None:
-        self._memory[self._past] = values
+        self.memory[self._past] = values
 
     def run(self, rows: NDArray[np.float64]) -> Values:
         """Return frames × 2 logits of 1/(UNIT × WEIGHT_UNIT) for (frames × FRAME_ROWS) × SENSED integers."""
         if len(rows) == self._frames * FRAME_ROWS:
             return self._run(rows)
-        other = Stream(self._weights, len(rows) // FRAME_ROWS)
+        other = Stream(self.weights, len(rows) // FRAME_ROWS)
         other.past = self.past
         logits = other._run(rows)
         self.past = other.past
@@ -187,9 +203,15 @@ class Stream:
         np.maximum.reduce(given, 1, None, most)
         for i in range(FRAMED_FROM, len(LAYERS) - 1):
             _layer(stages[i], stages[i + 1].new)
-        self._memory.take(self._moves, None, self._moved, "clip")
-        self._memory[...] = self._moved
+        self.memory.take(self.moves, None, self._moved, "clip")
+        self.memory[...] = self._moved
         return _sums(stages[-1])
+
+
+def layout(frames: int) -> list[int]:
+    """Return where each layer's values begin in a Stream's memory, and where the last one's end."""
+    sizes = [(layer.reach + frames * values_a_frame(i)) * layer.inputs for i, layer in enumerate(LAYERS)]
+    return [0, *accumulate(sizes)]
 
 
 def _kept(firsts: Sequence[int]) -> NDArray[np.intp]:

@@ -40,10 +40,10 @@ ACCEPTED: Final = 0.3
 
 Floats = NDArray[np.float64]
 
-_PERIODS: Final = np.concatenate((1.0 / FACTORS, 2.0 / FACTORS, 2.0 / FACTORS))
+PERIODS: Final = np.concatenate((1.0 / FACTORS, 2.0 / FACTORS, 2.0 / FACTORS))
 """Lags of r_m(T), r_m(2T), r_t(2T), as shares of the rough period; and where each correlation begins."""
 _FIRST: Final = np.repeat((0, 0, LAGS), len(FACTORS))
-_UNBIASED: Final = WINDOW / (WINDOW - np.arange(LAGS, dtype=np.float64))
+UNBIASED: Final = WINDOW / (WINDOW - np.arange(LAGS, dtype=np.float64))
 _APART: Final = WINDOW + LAGS - 1
 """From one column to the next, the rest being 0: no lag reaches from one into another."""
 
@@ -53,27 +53,31 @@ def cadence_hz(z: float) -> float:
     return SLOWEST_HZ + SPAN_HZ / (1.0 + exp(0.5 - z * LOGIT))
 
 
+NOTHING: Final = np.zeros((COLUMNS, WINDOW - FRAME_ROWS))
+"""What a window begins with before its first frame."""
+
+
 class Windows:
     """The last WINDOW rows of a stream, kept from frame to frame."""
 
     def __init__(self) -> None:
-        self._seen = np.zeros((1, COLUMNS, WINDOW))
+        self.seen = np.zeros((1, COLUMNS, WINDOW))
 
     @property
     def past(self) -> Floats:
         """COLUMNS × (WINDOW − FRAME_ROWS): what the next frame's window begins with."""
-        return self._seen[0, :, FRAME_ROWS:]
+        return self.seen[0, :, FRAME_ROWS:]
 
     @past.setter
     def past(self, columns: Floats) -> None:
-        self._seen[0, :, FRAME_ROWS:] = columns
+        self.seen[0, :, FRAME_ROWS:] = columns
 
     def take(self, rows: Floats) -> Floats:
         """Return frames × COLUMNS × WINDOW for (frames × FRAME_ROWS) × COLUMNS, to be read before more is taken."""
         if len(rows) == FRAME_ROWS:
-            self._seen[0, :, :-FRAME_ROWS] = self._seen[0, :, FRAME_ROWS:]
-            self._seen[0, :, -FRAME_ROWS:] = rows.T
-            return self._seen
+            self.seen[0, :, :-FRAME_ROWS] = self.seen[0, :, FRAME_ROWS:]
+            self.seen[0, :, -FRAME_ROWS:] = rows.T
+            return self.seen
         columns = np.concatenate((self.past, rows.T), axis=1)
         self.past = columns[:, len(rows) :]
         by_column, by_row = columns.strides
@@ -93,13 +97,13 @@ def correlations(seen: Floats) -> Floats:
         of_magnitude[:] = np.correlate(columns[:_APART], columns[:WINDOW], "valid")
         of_axes[:] = np.correlate(columns[_APART:], columns[_APART : WINDOW - _APART], "valid")
     r /= np.maximum(r[:, :, :1], 1.0)
-    r *= _UNBIASED
+    r *= UNBIASED
     return r
 
 
 def refined_hz(rough_hz: Sequence[float], r: Floats) -> list[float]:
     """Return the cadence that `correlations` have near each frame's `rough_hz`; that itself where they have none."""
-    lags = (ROWS_HZ / np.array(rough_hz))[:, None] * _PERIODS
+    lags = (ROWS_HZ / np.array(rough_hz))[:, None] * PERIODS
     whole = np.minimum(lags.astype(np.intp), LAGS - 1)
     lags -= whole
     whole += _FIRST
