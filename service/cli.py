@@ -294,7 +294,8 @@ def _source(options: argparse.Namespace, *, mirrored: bool) -> Source:
 
 
 def _settings(options: argparse.Namespace) -> Settings:
-    return Settings(**{field.name: getattr(options, field.name) for field in dataclasses.fields(Settings)})
+    given = {field.name: getattr(options, field.name) for field in dataclasses.fields(Settings)}
+    return Settings(**{name: value for name, value in given.items() if value is not None})
 
 
 def _parser() -> argparse.ArgumentParser:

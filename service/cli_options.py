@@ -40,11 +40,14 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
             f"--{field.name.replace('_', '-')}",
             type=str if repeated else type(field.default),
             action="append" if repeated else "store",
-            default=[] if repeated else field.default,
+            default=None if repeated else field.default,
             metavar=(meta["unit"] or "TEXT").upper(),
-            help=f"{meta['text']}{span}"
-            + ("" if field.default == "" else f" (default {'none' if repeated else field.default})"),
+            help=f"{meta['text']}{span}" + ("" if field.default == "" else f" (default {_default(field.default)})"),
         )
+
+
+def _default(value: object) -> str:
+    return (" ".join(value) or "none") if isinstance(value, tuple) else str(value)
 
 
 def add_air(parser: argparse.ArgumentParser) -> None:

@@ -19,9 +19,13 @@ class Settings:
 
     host: str = option("127.0.0.1", "address to listen on; only this machine's own addresses are allowed for now")
     port: int = option(8600, "TCP port to listen on; 0 picks a free one", low=0, high=65535)
-    counter: str = option("double_threshold", "counter whose count is a device's steps")
+    counter: str = option("steplink", "counter whose count is a device's steps")
     preset: str = option("tuned", "its parameters: paper (as published) or tuned")
-    beside: tuple[str, ...] = option((), "another counter to run on the same stream; may be repeated", unit="name")
+    beside: tuple[str, ...] = option(
+        ("double_threshold",),
+        "another counter to run on the same stream; may be repeated; none: no other",
+        unit="name",
+    )
     param: tuple[str, ...] = option((), "a parameter of a counter, NAME.KEY=VALUE; may be repeated", unit="name.key=v")
     durable_limit: int = option(
         1000, "events that may wait for a slow reader before it is closed", unit="events", low=10, high=100_000

@@ -156,8 +156,8 @@ class Update(NamedTuple):
     `likely` names every peak that can still become a step, where the counter can tell them apart; one it names no more
     and has not confirmed is retracted. `pending` counts those of them that pass what is in force. `trace` holds the
     filtered signal, one value a sample of the block, the first at device time `trace_from_s`. `gait` is the newest of a
-    counter that recognises walking, None of any other. A tuple, since one is made a packet and counter, and a frozen
-    dataclass takes twice as long to make.
+    counter that recognises walking, which has one in every update, None of any other. A tuple, since one is made a
+    packet and counter, and a frozen dataclass takes twice as long to make.
     """
 
     steps: tuple[Step, ...] = ()
@@ -331,6 +331,20 @@ class Segmented:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Walked:
+    """Durable: a walk `begins` or is over, by the verdict of `counter`, the primary, which recognises walking.
+
+    It begins at the device time from which it may have been one without a break, at most the counter's `latency_s`
+    before that was certain, and is over where it was last called one. Another boot or primary ends it too.
+    """
+
+    counter: str
+    boot: int
+    at_s: float
+    begins: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Described:
     """The device said something of itself (identity, rate, scale, battery)."""
 
@@ -397,6 +411,7 @@ Event = (
     | Corrected
     | Rebooted
     | Segmented
+    | Walked
     | Described
     | Signal
     | Counting

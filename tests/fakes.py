@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from service.counters.contract import Snapshot
-from service.samples import ACCELEROMETER_ONLY, GRID_HZ, Packet, SampleBlock, Step, Update
+from service.samples import ACCELEROMETER_ONLY, GRID_HZ, Gait, Packet, SampleBlock, Step, Update, Verdict
 from service.wearables import bracelet as wire
 
 EVERY = 25
@@ -38,6 +38,57 @@ class MetronomeCounter:
 
     def restore(self, state: Snapshot) -> None:
         self._next = state["next"]
+
+
+FRAME = 24
+"""The gate's verdict comes once in so many samples."""
+RAMP = [(100, "rest"), (150, "perhaps"), (400, "other"), (500, "perhaps"), (1000, "walking")]
+"""What the gate makes of the ramp that the fake device sends: up to which x, which verdict."""
+
+
+class GateCounter(MetronomeCounter):
+    """A metronome that recognises walking: it credits its steps of a walk, and the uncertain ones just before."""
+
+    name = "gate"
+    latency_s = 4.0
+
+    def __init__(self):
+        super().__init__()
+        self._frame = 0
+        self._waiting: list[int] = []
+        self._gait = Gait(at_s=0.0, verdict=Verdict.REST, confidence=0.0, cadence_hz=None)
+
+    def update(self, block: SampleBlock) -> Update:
+        if block.start != self._next:
+            self._frame = block.start
+        self.seen.append((block.start, len(block)))
+        self._next = block.start + len(block)
+        steps: list[Step] = []
+        for k in range(block.start, self._next):
+            if k % EVERY == 0:
+                self._waiting.append(k)
+            if k - self._frame == FRAME - 1:
+                self._frame = k + 1
+                steps += self._decide(k, round(block.acc_g[0][k - block.start] * 4096))
+        return Update(steps=tuple(steps), pending=len(self._waiting), gait=self._gait)
+
+    def _decide(self, k: int, x: int) -> list[Step]:
+        verdict = Verdict(next(word for until, word in RAMP if x < until))
+        walks = verdict is Verdict.WALKING
+        confidence = {Verdict.WALKING: 0.95, Verdict.PERHAPS: 0.6}.get(verdict, 0.05)
+        self._gait = Gait(k / GRID_HZ, verdict, confidence, 2.0 if walks else None)
+        if verdict is Verdict.PERHAPS:
+            return []
+        waiting, self._waiting = self._waiting, []
+        return [Step(at_s=one / GRID_HZ, strength=1.0) for one in waiting if walks]
+
+    def snapshot(self) -> Snapshot:
+        return {"next": self._next, "frame": self._frame, "waiting": list(self._waiting), "gait": list(self._gait)}
+
+    def restore(self, state: Snapshot) -> None:
+        self._next, self._frame, self._waiting = state["next"], state["frame"], list(state["waiting"])
+        at_s, verdict, confidence, cadence_hz = state["gait"]
+        self._gait = Gait(at_s, Verdict(verdict), confidence, cadence_hz)
 
 
 def described(

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from fastapi import FastAPI, Query, Response
 
 from service.api import models
-from service.api.steps import StepsQuery, list_page
+from service.api.steps import EventsQuery, StepsQuery, steps_page, walks_page
 from service.api.views import counter_view, device_view, lineup_view
 from service.counters import registry
 from service.pipeline.lineup import CounterChoice, Lineup
@@ -66,7 +66,15 @@ def add_device_routes(app: FastAPI, supervisor: Supervisor) -> None:
     @app.get("/api/v1/devices/{id}/steps", tags=["devices"], responses={**_UNKNOWN, **_NOT_STORED})
     async def list_steps(id: str, query: Annotated[StepsQuery, Query()]) -> models.Page[models.StepEvent]:  # noqa: A002
         """List a device's confirmed steps, oldest first."""
-        return await list_page(supervisor.device(id), query)
+        return await steps_page(supervisor.device(id), query)
+
+    @app.get("/api/v1/devices/{id}/walks", tags=["devices"], responses={**_UNKNOWN, **_NOT_STORED})
+    async def list_walks(id: str, query: Annotated[EventsQuery, Query()]) -> models.Page[models.WalkEvent]:  # noqa: A002
+        """List when a device's wearer began and ceased to walk, oldest first.
+
+        Nothing where the primary does not recognise walking.
+        """
+        return await walks_page(supervisor.device(id), query)
 
 
 def add_person_routes(app: FastAPI, supervisor: Supervisor, trials: Trials) -> None:

@@ -11,6 +11,7 @@ from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
+from service.api.gait_models import CADENCE, GAIT, REFUSED, GaitModel, RefusedModel
 from service.pipeline.lifecycle import State
 
 Item = TypeVar("Item")
@@ -55,7 +56,11 @@ class Device(BaseModel):
     sensors: list[str] | None = Field(
         description="What the device says it measures; null until it has", examples=[["accelerometer", "gyroscope"]]
     )
-    cadence_spm: float | None = Field(description="Steps a minute; null while nobody walks", examples=[108.4])
+    cadence_spm: float | None = Field(description=CADENCE, examples=[108.4])
+    gait: GaitModel | None = Field(description=GAIT)
+    refused: dict[str, RefusedModel] = Field(
+        description=REFUSED, examples=[{"double_threshold": {"rest": 0, "other": 38, "perhaps": 3}}]
+    )
     battery_percent: int | None = Field(examples=[87])
     rate_hz: float | None = Field(description="Nominal sampling rate", examples=[50.0])
     measured_rate_hz: float | None = Field(
@@ -214,6 +219,18 @@ class SegmentEvent(_Durable):
     steps: int = Field(description="The device's steps so far")
 
 
+class WalkEvent(_Durable):
+    """A walk began or is over, by a primary that recognises walking; for a beginning, told once it is certain."""
+
+    type: Literal["walk"] = "walk"
+    status: Literal["began", "ended"]
+    counter: str = Field(description="The primary that says so", examples=["steplink"])
+    device_s: float = Field(
+        description="Device time at which it began, in retrospect, or was no walk any more", examples=[21.34]
+    )
+    boot: int
+
+
 class BandModel(BaseModel):
     """Both thresholds over a window of device time."""
 
@@ -234,13 +251,14 @@ class SignalEvent(_Event):
 
 
 class CountingEvent(_Event):
-    """Both counts and the cadence, at each packet."""
+    """Both counts, cadence and whether somebody walks, at each packet."""
 
     type: Literal["counting"] = "counting"
     now_s: float = Field(description="Device time of the newest sample")
     steps: int
     steps_now: int
-    cadence_spm: float | None
+    cadence_spm: float | None = Field(description=CADENCE)
+    gait: GaitModel | None = Field(description=GAIT)
 
 
 class DeviceEvent(_Event):
@@ -274,6 +292,7 @@ LiveMessage = Annotated[
     | AwaitedEvent
     | RebootEvent
     | SegmentEvent
+    | WalkEvent
     | SignalEvent
     | CountingEvent
     | DeviceEvent
@@ -282,7 +301,8 @@ LiveMessage = Annotated[
     Field(discriminator="type"),
 ]
 DurableEvent = Annotated[
-    StepEvent | StateEvent | GapEvent | CorrectionEvent | RebootEvent | SegmentEvent, Field(discriminator="type")
+    StepEvent | StateEvent | GapEvent | CorrectionEvent | RebootEvent | SegmentEvent | WalkEvent,
+    Field(discriminator="type"),
 ]
 
 

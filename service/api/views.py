@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from service.api import models
+from service.api.gait_models import GaitModel, RefusedModel
 from service.counters import describe
 from service.counters.registry import CounterKind
 from service.pipeline.device import Device
@@ -20,17 +22,21 @@ from service.samples import (
     Corrected,
     Counting,
     DeviceInfo,
+    Gait,
     Gap,
     Rebooted,
     Segmented,
     Signal,
     StepCounted,
     Tentative,
+    Verdict,
+    Walked,
 )
 from service.signals.hosttime import Drift
 from service.signals.rate import Rate
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_CONFIDENCE_DIGITS = 3
 _SIGNAL_DIGITS = 4
 """Digits of a plotted g: finer than any screen."""
 
@@ -64,6 +70,8 @@ def device_view(device: Device) -> models.Device:
         counter_faults=tracker.counter_faults,
         sensors=None if info.sensors is None else list(info.sensors),
         cadence_spm=tracker.cadence_spm if device.state is State.STREAMING else None,
+        gait=_gait_view(tracker.gait) if device.state is State.STREAMING else None,
+        refused={name: _refused_view(count) for name, count in tracker.refused.items()},
         battery_percent=info.battery_percent,
         rate_hz=info.rate_hz,
         **_clocks_view(tracker.rate, session.drift),
@@ -119,6 +127,13 @@ def event_view(notice: Notice, supervisor: Supervisor) -> models.LiveMessage:
     return durable_view(notice)
 
 
+_SAME_FIELDS: dict[type, Callable[..., models.DurableEvent]] = {
+    Corrected: models.CorrectionEvent,
+    Rebooted: models.RebootEvent,
+    Segmented: models.SegmentEvent,
+}
+
+
 def durable_view(notice: Notice) -> models.DurableEvent:
     """Return a durable notice as an event."""
     device, at, ordinal, event = notice.device, utc(notice.at_ns), notice.ordinal or 0, notice.event
@@ -137,12 +152,11 @@ def durable_view(notice: Notice) -> models.DurableEvent:
                 samples=event.samples,
                 filled=event.filled,
             )
-        case Corrected():
-            return models.CorrectionEvent(device=device, at=at, ordinal=ordinal, **dataclasses.asdict(event))
-        case Rebooted(boot=boot, previous=previous):
-            return models.RebootEvent(device=device, at=at, ordinal=ordinal, boot=boot, previous=previous)
-        case Segmented(primary=primary, steps=steps):
-            return models.SegmentEvent(device=device, at=at, ordinal=ordinal, primary=primary, steps=steps)
+        case Corrected() | Rebooted() | Segmented():
+            view = _SAME_FIELDS[type(event)]
+            return view(device=device, at=at, ordinal=ordinal, **dataclasses.asdict(event))
+        case Walked():
+            return walk_view(notice)
         case _:
             raise TypeError(f"{event!r} is not durable")
 
@@ -168,6 +182,22 @@ def step_view(notice: Notice) -> models.StepEvent:
         valley=step.valley,
         upper=step.upper,
         lower=step.lower,
+    )
+
+
+def walk_view(notice: Notice) -> models.WalkEvent:
+    """Return a notice of a walk as an event."""
+    event = notice.event
+    if not isinstance(event, Walked):
+        raise TypeError(f"{event!r} is no walk")
+    return models.WalkEvent(
+        device=notice.device,
+        at=utc(notice.at_ns),
+        ordinal=notice.ordinal or 0,
+        status="began" if event.begins else "ended",
+        counter=event.counter,
+        device_s=event.at_s,
+        boot=event.boot,
     )
 
 
@@ -246,10 +276,21 @@ def _ephemeral_view(notice: Notice, event: Signal | Counting) -> models.SignalEv
             steps=event.steps,
             steps_now=event.steps_now,
             cadence_spm=event.cadence_spm,
+            gait=_gait_view(event.gait),
         )
     values = [round(float(value), _SIGNAL_DIGITS) for value in event.values]
     bands = [_band_view(band) for band in event.bands]
     return models.SignalEvent(device=device, at=at, from_s=event.from_s, values=values, bands=bands)
+
+
+def _gait_view(gait: Gait | None) -> GaitModel | None:
+    if gait is None:
+        return None
+    return GaitModel(verdict=gait.verdict, confidence=round(gait.confidence, _CONFIDENCE_DIGITS), device_s=gait.at_s)
+
+
+def _refused_view(count: Mapping[Verdict, int]) -> RefusedModel:
+    return RefusedModel(rest=count[Verdict.REST], other=count[Verdict.OTHER], perhaps=count[Verdict.PERHAPS])
 
 
 def _band_view(band: Band) -> models.BandModel:

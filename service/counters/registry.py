@@ -25,8 +25,11 @@ from service.counters.learning import MIDDLE, SLOWEST_WALK, WALK, Method
 from service.errors import CounterError, ParameterError
 from service.samples import Sensor
 
-DEFAULT: Final = "double_threshold"
+DEFAULT: Final = "steplink"
 """The counter that runs where none is asked for."""
+
+BESIDE: Final = "double_threshold"
+"""The counter that runs beside it, so that one sees what it refused."""
 
 ACCELEROMETER: Final = frozenset({Sensor.ACCELEROMETER})
 GYROSCOPE: Final = frozenset({Sensor.GYROSCOPE})

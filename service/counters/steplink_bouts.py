@@ -19,6 +19,7 @@ from typing import Final
 
 from service.counters.steplink_front import EVERY
 from service.counters.steplink_network import DELAY, FRAME_ROWS
+from service.counters.steplink_rhythm import FASTEST_HZ
 from service.samples import GRID_HZ
 
 FRAME: Final = FRAME_ROWS * EVERY
@@ -99,8 +100,8 @@ def end(s: State) -> None:
 
 
 def room(n: int, waiting: float) -> int:
-    """Return how many floats the rows of n samples may take: five steps a second, and of the frames that wait."""
-    return ROW * int((n + (waiting + DELAY + 2) * FRAME) / 10 + 8)
+    """Return how many floats the rows of n samples may take, and of what was not judged or waits."""
+    return ROW * int((n + (waiting + DELAY + 2) * FRAME) * FASTEST_HZ / GRID_HZ + 2)
 
 
 def advance(s: State, trace: Floats, n: int, z: Floats, c: Floats, out: State) -> int:

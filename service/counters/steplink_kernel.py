@@ -129,7 +129,7 @@ def infer(
     new = PLAN[0, NEW]
     for row in range(FRAME_ROWS):
         for i in range(SENSED):
-            memory[new + row * SENSED + i] = rows[first + row * ROW + i]
+            memory[new + row * SENSED + i] = np.float32(rows[first + row * ROW + i])
     _layer(0, memory, weights, given, given, SUMS)
     outputs, to = PLAN[0, OUTPUTS], PLAN[1, NEW]
     for i in range(POOLED):
@@ -145,7 +145,7 @@ def infer(
     _sum(LAST, PLAN[LAST, PLACE], memory, weights, given)
     for i in range(len(moves)):
         memory[i] = memory[moves[i]]
-    return given[0] * LOGIT, SLOWEST_HZ + SPAN_HZ / (1.0 + exp(0.5 - given[1] * LOGIT))
+    return float(given[0]) * LOGIT, SLOWEST_HZ + SPAN_HZ / (1.0 + exp(0.5 - float(given[1]) * LOGIT))
 
 
 def _layer(layer: int, memory: Values, weights: Values, sums: Values, to: Values, end: int) -> None:

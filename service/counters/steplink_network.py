@@ -200,7 +200,7 @@ class Stream:
         mean, most = stages[FRAMED_FROM].new[:, :WIDE], stages[FRAMED_FROM].new[:, WIDE:]
         np.divide(np.add.reduce(given, 1), _POOLED, out=mean)
         np.rint(mean, out=mean)
-        np.maximum.reduce(given, 1, None, most)
+        np.maximum.reduce(given, 1, out=most)
         for i in range(FRAMED_FROM, len(LAYERS) - 1):
             _layer(stages[i], stages[i + 1].new)
         self.memory.take(self.moves, None, self._moved, "clip")

@@ -1,9 +1,9 @@
 """The exact cadence of steplink's counter: the network knows it roughly, autocorrelation knows it well.
 
 Once a frame, over the last WINDOW rows of the front end (4.16 s): r_m is the autocorrelation of the magnitude, r_t that
-of the three axes together, normalised and unbiased. For 41 factors q from 0.75 to 1.33, T = 1/(c q), c being the
-network's cadence, S(q) = (r_m(T) + r_m(2T) + r_t(2T))/3; where S − 3 ln² q is greatest, off both ends and with S above
-0.3, c q is the cadence. Twice T, since one foot differs from the other and an arm swings once in two steps.
+of the three axes together, normalised and unbiased. For 61 factors q from 0.6 to 1.5, T = 1/(c q), c being the
+network's cadence, S(q) = (r_m(T) + r_m(2T) + r_t(2T))/3; where S − 2 ln² q is greatest, off both ends and with S above
+0.35, c q is the cadence. Twice T, since one foot differs from the other and an arm swings once in two steps.
 
 The rows are integers, so each sum of products is exact and its bits are the same whichever way it is found.
 """
@@ -33,10 +33,11 @@ SPAN_HZ: Final = 3.2
 """The network's cadence is SLOWEST_HZ + SPAN_HZ σ(z − 0.5)."""
 LOGIT: Final = 1.0 / (UNIT * WEIGHT_UNIT)
 
-FACTORS: Final = 0.75 * (1.33 / 0.75) ** (np.arange(41) / 40.0)
+FACTORS: Final = 0.6 * (1.5 / 0.6) ** (np.arange(61) / 60.0)
 _FACTORS: Final[list[float]] = FACTORS.tolist()
-COSTS: Final = 3.0 * np.log(FACTORS) ** 2
-ACCEPTED: Final = 0.3
+FASTEST_HZ: Final = (SLOWEST_HZ + SPAN_HZ) * _FACTORS[-1]
+COSTS: Final = 2.0 * np.log(FACTORS) ** 2
+ACCEPTED: Final = 0.35
 
 Floats = NDArray[np.float64]
 

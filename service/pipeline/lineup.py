@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from service.counters import registry
 from service.counters.contract import StepCounter
 from service.errors import ParameterError
+
+NO_OTHER: Final = "none"
+"""In place of a counter's name: nothing runs beside the primary."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +88,7 @@ def lineup(primary: str, *, beside: Iterable[str] = (), preset: str = "tuned", p
 
     CounterError and ParameterError name what is unknown, wrong or out of range.
     """
-    names = list(dict.fromkeys([primary, *beside]))
+    names = list(dict.fromkeys([primary, *(name for name in beside if name != NO_OTHER)]))
     overrides: dict[str, dict[str, object]] = {name: {} for name in names}
     for text in params:
         path, equals, value = text.partition("=")

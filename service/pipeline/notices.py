@@ -22,6 +22,7 @@ from service.samples import (
     Signal,
     StepCounted,
     Tentative,
+    Walked,
 )
 from service.store.values import LogEntry, Note
 
@@ -60,12 +61,15 @@ class Notice:
     event: Told
 
 
+WALK: Final = "walk"
+"""Kind of a log entry that tells of a walk."""
 KINDS: Final[dict[str, type[Any]]] = {
     "state": StateChanged,
     "gap": Gap,
     "correction": Corrected,
     "reboot": Rebooted,
     "segment": Segmented,
+    WALK: Walked,
 }
 """Durable events that are no steps, by the name they are stored under."""
 _NAMES: Final = {event: kind for kind, event in KINDS.items()}

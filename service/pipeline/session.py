@@ -31,6 +31,7 @@ from service.samples import (
     Received,
     StepCounted,
     Tentative,
+    Walked,
 )
 from service.signals.hosttime import Drift, HostClock
 from service.store.chunker import blocks
@@ -352,7 +353,7 @@ class Session:
         match event:
             case StepCounted():
                 return self._clock(run).at_ns(event.step.at_s)
-            case Tentative():
+            case Tentative() | Walked():
                 return self._clock(run).at_ns(event.at_s)
             case Gap():
                 return self._clock(run).at_ns(event.to_s)

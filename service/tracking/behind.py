@@ -179,6 +179,7 @@ class Behind:
             steps=self._committed.total,
             steps_now=self.steps_now,
             cadence_spm=self.front.cadence_spm,
+            gait=self.front.gait,
         )
 
     def tally_samples(self, block: RawBlock) -> None:

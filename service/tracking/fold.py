@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from service.counters.contract import StepCounter
 from service.errors import CounterError
@@ -18,6 +18,7 @@ from service.samples import (
     Counting,
     DeviceInfo,
     Event,
+    Gait,
     Gridded,
     Likely,
     RawBlock,
@@ -29,16 +30,23 @@ from service.samples import (
     StepCounted,
     Tentative,
     Update,
+    Verdict,
+    Walked,
 )
 from service.signals.heading import WalkingDirection
 from service.signals.rate import Rate
 from service.signals.timebase import Timebase
 from service.tracking.cadence import Cadence
-from service.tracking.cutting import cut
+from service.tracking.cutting import cut, pieces
 from service.tracking.fitness import Stream, faults
 from service.tracking.intake import info_after, info_of, merged
+from service.tracking.refused import Refused
 from service.tracking.tally import Tally
 from service.tracking.tentative import TentativeSteps
+from service.tracking.walking import Walking
+
+PIECE_SAMPLES: Final = 20
+"""A primary that recognises walking is given so much at a time, less than its frame: no verdict passes unheard."""
 
 CounterFactory = Callable[[], StepCounter]
 
@@ -72,6 +80,9 @@ class Fold:
         self._factories = dict(counters)
         self._counters = {name: make() for name, make in counters.items()}
         self._cadence = Cadence()
+        self._walking, self._refused = self._gate()
+        self._recognises = True
+        """Whether the primary has a verdict; it is believed to until it has counted a block and told none."""
         self._heading = WalkingDirection()
         self._timebase: Timebase | None = None
 
@@ -88,8 +99,20 @@ class Fold:
 
     @property
     def cadence_spm(self) -> float | None:
-        """Steps a minute now; None while nobody walks."""
-        return self._cadence.spm(self.now_s)
+        """Steps a minute now, by the primary's own word where it has one; None while nobody walks."""
+        if self.gait is None:
+            return self._cadence.spm(self.now_s)
+        return None if self.gait.cadence_hz is None else 60 * self.gait.cadence_hz
+
+    @property
+    def gait(self) -> Gait | None:
+        """What the primary makes of the motion; None where it does not recognise walking, or cannot count."""
+        return self._walking.gait
+
+    @property
+    def refused(self) -> dict[str, dict[Verdict, int]]:
+        """How many steps of other counters the primary refused, by what it made of the motion."""
+        return self._refused.counts
 
     @property
     def measured_rate_hz(self) -> float | None:
@@ -154,16 +177,20 @@ class Fold:
         events.append(Gridded(block=samples))
         pending = self.steps_now - self.total if self.primary in self.counter_faults else 0
         for name in [name for name in self._counters if name not in self.counter_faults]:
+            cut_to = PIECE_SAMPLES if name == self.primary and self._recognises else len(samples)
             try:
-                update = self._counters[name].update(samples)
+                updates = [self._counters[name].update(piece) for piece in pieces(samples, cut_to)]
             except CounterError as fault:
                 self.counter_faults[name] = str(fault)
                 continue
-            events += self._take(name, update)
+            events += [event for update in updates for event in self._take(name, update)]
             if name == self.primary:
-                pending = update.pending
-                if len(update.trace) or update.bands:
-                    events.append(Signal(from_s=update.trace_from_s, values=update.trace, bands=update.bands))
+                pending = updates[-1].pending
+                self._recognises = updates[-1].gait is not None or not len(samples)
+                events += _signal(updates)
+        if self.primary in self.counter_faults:
+            events += self._recognise(None)
+        self._refused.settle()
         events.append(self._counting(pending))
         return events
 
@@ -187,9 +214,13 @@ class Fold:
         self._judged = None
         self._judge()
         if primary == self.primary and primary in kept:
+            self._refused.keep(kept)
             return events
+        events += self._recognise(None)
         self.primary, self._segment = primary, (before, self.steps[primary])
         self._cadence = Cadence()
+        self._walking, self._refused = self._gate()
+        self._recognises = True
         events += self._follow((), ())
         return [*events, Segmented(primary=primary, steps=before), self._counting(0)]
 
@@ -205,6 +236,8 @@ class Fold:
             "steps_now": self.steps_now,
             "segment": list(self._segment),
             "cadence": self._cadence.snapshot(),
+            "walking": self._walking.snapshot(),
+            "refused": self._refused.snapshot(),
             "tentative": self.tentative.snapshot(),
             "heading": self._heading.snapshot(),
             "run": self.run,
@@ -224,6 +257,8 @@ class Fold:
         before, own = state["segment"]
         self._segment = (before, own)
         self._cadence.restore(state["cadence"])
+        self._walking.restore(state["walking"])
+        self._refused.restore(state["refused"])
         self.tentative.restore(state["tentative"])
         self._heading.restore(state["heading"])
         self.run, self.boot, self.next_index = state["run"], state["boot"], state["next_index"]
@@ -250,10 +285,24 @@ class Fold:
             timebase.set_clock(*self.info.clock)
         return timebase
 
+    def _gate(self) -> tuple[Walking, Refused]:
+        """Return what follows the primary's verdicts, afresh."""
+        latency_s = self._counters[self.primary].latency_s
+        return Walking(self.primary, latency_s), Refused(latency_s)
+
+    def _recognise(self, gait: Gait | None) -> list[Walked]:
+        """Take what the primary makes of the motion; return what begins or ends with it."""
+        if gait is None and self.gait is None:
+            return []
+        self._refused.say(gait)
+        return self._walking.follow(gait, self.boot or 0)
+
     def _take(self, name: str, update: Update) -> list[Event]:
         """Take what a counter says: of the primary, tentative steps first, so that each step has been told before."""
         events: list[Event] = []
         if name == self.primary:
+            if update.gait is not None:
+                events += self._recognise(update.gait)
             events += self._follow(update.likely, update.steps)
         for step in update.steps:
             self.steps[name] += 1
@@ -269,6 +318,9 @@ class Fold:
             )
             if name == self.primary:
                 self._cadence.add(step.at_s)
+                self._refused.count(step.at_s)
+            else:
+                self._refused.count_beside(name, step.at_s)
         return events
 
     def _follow(self, likely: Sequence[Likely], confirmed: Sequence[Step]) -> list[Tentative]:
@@ -290,9 +342,23 @@ class Fold:
         return timebase_s + self._counters[name].time_error_s
 
     def _finish_counters(self) -> list[Event]:
-        return [event for name, counter in self._counters.items() for event in self._take(name, counter.finish())]
+        events = [event for name, counter in self._counters.items() for event in self._take(name, counter.finish())]
+        self._refused.end()
+        return [*events, *self._recognise(None)]
 
     def _counting(self, pending: int) -> Counting:
         steps = self.total
         self.steps_now = steps + pending
-        return Counting(now_s=self.now_s, steps=steps, steps_now=self.steps_now, cadence_spm=self.cadence_spm)
+        return Counting(
+            now_s=self.now_s, steps=steps, steps_now=self.steps_now, cadence_spm=self.cadence_spm, gait=self.gait
+        )
+
+
+def _signal(updates: Sequence[Update]) -> list[Signal]:
+    """Return what the primary's updates of one block show, as one: of two at once, only the second would be shown."""
+    traced = [update for update in updates if len(update.trace)]
+    bands = tuple(band for update in updates for band in update.bands)
+    if not traced and not bands:
+        return []
+    values = traced[0].trace if len(traced) == 1 else [value for update in traced for value in update.trace]
+    return [Signal(from_s=(traced or updates)[0].trace_from_s, values=values, bands=bands)]

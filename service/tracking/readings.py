@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from service.errors import WireError
-from service.samples import DeviceInfo
+from service.samples import DeviceInfo, Gait, Verdict
 from service.signals.rate import Rate
 from service.tracking.fold import Fold
 from service.tracking.intake import Intake
@@ -53,6 +53,16 @@ class Readings:
     def cadence_spm(self) -> float | None:
         """Steps a minute now; None while nobody walks."""
         return self._front.cadence_spm
+
+    @property
+    def gait(self) -> Gait | None:
+        """What the primary makes of the motion now; None where it does not recognise walking, or cannot count."""
+        return self._front.gait
+
+    @property
+    def refused(self) -> dict[str, dict[Verdict, int]]:
+        """How many steps of other counters the primary refused, by what it made of the motion."""
+        return self._committed.refused
 
     @property
     def measured_rate_hz(self) -> float | None:

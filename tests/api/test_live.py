@@ -180,6 +180,7 @@ async def test_every_event_has_a_schema_and_openapi_has_examples(walk):
         "gap",
         "reboot",
         "segment",
+        "walk",
         "correction",
         "awaited",
         "signal",

@@ -131,7 +131,7 @@ def test_the_keyboard_opens_chooses_and_closes_the_dialog(scripted: Scripted) ->
     page.get_by_role("button", name="Counters of Left wrist").focus()
     page.keyboard.press("Enter")
     dialog = page.get_by_role("dialog")
-    expect(dialog.locator(".choice")).to_have_count(7)
+    expect(dialog.locator(".choice")).to_have_count(len(registry.COUNTERS))
     dialog.get_by_role("checkbox", name="double threshold").focus()
     page.keyboard.press("Tab")
     page.keyboard.press("ArrowDown")
@@ -148,7 +148,7 @@ def test_the_dialog_fits_and_its_targets_are_large_enough(scripted: Scripted, wi
     page = server.open()
     page.get_by_role("button", name="Counters of").click()
     dialog = page.get_by_role("dialog")
-    expect(dialog.locator(".choice")).to_have_count(7)
+    expect(dialog.locator(".choice")).to_have_count(len(registry.COUNTERS))
     choice(dialog, "double_threshold").locator("summary").click()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert dialog.locator(".choices").evaluate("list => list.scrollWidth - list.clientWidth") <= 0

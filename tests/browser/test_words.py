@@ -74,7 +74,8 @@ def test_whatever_is_ticked_a_lineup_has_its_primary_first_and_each_counter_once
     ],
 )
 def test_what_is_typed_is_an_override_unless_it_is_the_presets_own(run: Run, text: str, params: dict[str, Any]) -> None:
-    (bout,) = [one for one in COUNTERS[0]["parameters"] if one["name"] == "bout"]
+    double_threshold = COUNTERS[NAMES.index("double_threshold")]
+    (bout,) = [one for one in double_threshold["parameters"] if one["name"] == "bout"]
     entry = {"preset": "tuned", "params": {"bout": 9}}
     assert run("return lineup.typed(a[0], a[1], a[2]);", [bout, entry, text]) == params
 

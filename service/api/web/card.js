@@ -6,6 +6,7 @@
 
 import { CalibrationPanel } from "./calibration_panel.js";
 import { UNKNOWN, deviation, duration, localTime, measured, percent, plural, uncertain, whole } from "./format.js";
+import { gaitWords, refusedWords } from "./gait.js";
 import { Lanes, glyph } from "./lanes.js";
 import { look } from "./looks.js";
 import { Plot } from "./plot.js";
@@ -40,6 +41,7 @@ export class Card {
   #before = null;
   #name = "";
   #steps = null;
+  #recognises = null;
 
   /**
    * `tell.act(device, verb)` asks the server to "connect" or "disconnect" and resolves to an error's text or null;
@@ -66,6 +68,7 @@ export class Card {
     this.#state(stale ? "stale" : shownState(device));
     this.#head(device, now);
     this.#numbers(device);
+    this.#gait(device);
     this.#counters(device);
     this.#facts(device, now);
   }
@@ -168,6 +171,21 @@ export class Card {
     this.#text("cadence", shownState(device) === "streaming" ? whole(cadence_spm) : UNKNOWN);
     if (this.#steps !== null && steps_now > this.#steps) this.#beat();
     this.#steps = steps_now;
+  }
+
+  /** Whether somebody walks: its place stays while the primary is one that has said so before. */
+  #gait(device) {
+    const live = shownState(device) === "streaming";
+    if (device.gait) this.#recognises = device.primary;
+    const shown = this.#recognises === device.primary;
+    const { verdict, word, sure } = gaitWords(live ? device : { gait: null });
+    this.#fields["gait-row"].hidden = !shown;
+    this.#fields["gait-row"].dataset.verdict = verdict;
+    this.#fields["gait-icon"].setAttribute("href", `#g-${verdict}`);
+    this.#text("gait", word);
+    this.#text("gait-sure", sure);
+    this.#text("refused", shown ? refusedWords(device) : "");
+    this.#fields.refused.hidden = !this.#fields.refused.textContent;
   }
 
   #beat() {

@@ -75,10 +75,10 @@ const TAKERS = {
     entry.trace.addTentative(message, nowMs, entry.device.primary);
   },
   segment(entry, { primary, steps }) {
-    entry.device = { ...entry.device, primary, steps, steps_now: steps };
+    entry.device = { ...entry.device, primary, steps, steps_now: steps, gait: null, refused: {} };
   },
-  counting(entry, { steps, steps_now, cadence_spm }) {
-    entry.device = { ...entry.device, steps, steps_now, cadence_spm };
+  counting(entry, { steps, steps_now, cadence_spm, gait }) {
+    entry.device = { ...entry.device, steps, steps_now, cadence_spm, gait };
   },
   signal(entry, message, nowMs) {
     entry.trace.addSignal(message, nowMs);

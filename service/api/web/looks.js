@@ -13,6 +13,7 @@ const SHAPES = {
   wedge: "M0 1.15 1.1-.85H-1.1Z",
   cross: "M-.4-1.2H.4V-.4H1.2V.4H.4V1.2H-.4V.4H-1.2V-.4H-.4Z",
   bar: "M-.45-1.25H.45V1.25H-.45Z",
+  star: "M0-1.35.4-.4 1.3-.3.65.35.85 1.25 0 .75-.85 1.25-.65.35-1.3-.3-.4-.4Z",
   hexagon: "M-.6-1.05H.6L1.2 0 .6 1.05H-.6L-1.2 0Z",
 };
 const ACCELERATION = "Filtered acceleration, g";
@@ -24,6 +25,7 @@ const LOOKS = {
   fusion: { shape: "cross", colour: "mark-plum" },
   conventional_peak: { shape: "wedge", colour: "mark-indigo" },
   plus_minus: { shape: "bar", colour: "mark-slate" },
+  steplink: { shape: "star", colour: "mark-rose" },
 };
 /** A counter that this page does not know yet. */
 const OTHER = { shape: "hexagon", colour: "mark-slate" };
