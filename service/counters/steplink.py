@@ -245,6 +245,11 @@ def latency_s(p: SteplinkParams) -> float:
 @cache
 def shipped() -> network.Weights:
     """Return the weights that come with the package."""
+    return load()
+
+
+def load() -> network.Weights:
+    """Read the weights that come with the package."""
     with resources.files("service.counters").joinpath("steplink_weights.npz").open("rb") as file, np.load(file) as kept:
         return network.weights_of(dict(kept))
 

@@ -1,12 +1,15 @@
 """steplink's counter with numba: its state as arrays, and the compiled kernel that takes a packet in one call.
 
-Compiling takes seconds. A recording waits for it (`kernel`); a session does not: it goes on plainly until somebody has
-compiled (`ready`), and then as it was, to the same bits. Network and rhythm are shared with the plain way, so to change
+Compiling takes seconds. A recording waits for it (`kernel`); a session does not: it goes on plainly until somebody had
+it compiled (`compile_live`), and then as it was, to the same bits. Network and rhythm are shared with the plain way, so to change
 over is to copy a few lists.
 """
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -26,8 +29,8 @@ BLOCK: Final = 4096
 _AHEAD: Final = ahead.ROW * (network.DELAY + 2) * bouts.FRAME
 """Room for what is likely: less than a step a sample since the newest answer."""
 
-_compiled: Final[list[Kernel]] = []
-"""The kernel, once it is."""
+_live: Final[list[Kernel]] = []
+"""The kernel, once live counting may go on with it."""
 
 
 class Fed(NamedTuple):
@@ -40,18 +43,36 @@ class Fed(NamedTuple):
 
 
 def ready() -> Kernel | None:
-    """Return the compiled kernel if there is one already."""
-    return _compiled[0] if _compiled else None
+    """Return the compiled kernel if live counting may go on with it by now."""
+    return _live[0] if _live else None
 
 
+def compile_live() -> None:
+    """Compile, for seconds if nothing was compiled before; then counters go on with the kernel, where numba is there."""
+    made = kernel()
+    if made is not None and not _live:
+        _live.append(made)
+
+
+@contextlib.contextmanager
+def compiled_live() -> Iterator[None]:
+    """Have live counting compiled while the context is open, and plain after it."""
+    compile_live()
+    try:
+        yield
+    finally:
+        _live.clear()
+
+
+@cache
 def kernel() -> Kernel | None:
     """Return the compiled kernel, after seconds if it is the first time; None where numba is missing."""
-    if not _compiled and available():
-        made = compiled(scalar.packet)
-        frames = Frames(network.Weights(np.zeros(network.PLACES[-1], np.float32)), 0.0)
-        Arrays(front.fresh(), [0.0] * bouts.SIZE, frames).feed(made, ([0.0], [0.0], [0.0]), 1)
-        _compiled.append(made)
-    return ready()
+    if not available():
+        return None
+    made = compiled(scalar.packet)
+    frames = Frames(network.Weights(np.zeros(network.PLACES[-1], np.float32)), 0.0)
+    Arrays(front.fresh(), [0.0] * bouts.SIZE, frames).feed(made, ([0.0], [0.0], [0.0]), 1)
+    return made
 
 
 class Arrays:

@@ -157,7 +157,7 @@ class Stream:
     def __init__(self, weights: Weights, frames: int = 1) -> None:
         self.weights, self._frames = weights, frames
         places = layout(frames)
-        self.memory = np.zeros(places[-1], np.float32)
+        self.memory = np.zeros(places[-1], weights.flat.dtype)
         """What goes into each layer, after what went in before; see `layout`."""
         self._stages = [
             _stage(i, kernel, self.memory[places[i] : places[i + 1]], frames)
@@ -205,7 +205,7 @@ class Stream:
             _layer(stages[i], stages[i + 1].new)
         self.memory.take(self.moves, None, self._moved, "clip")
         self.memory[...] = self._moved
-        return _sums(stages[-1])
+        return _sums(stages[-1]).copy()
 
 
 def layout(frames: int) -> list[int]:
@@ -227,7 +227,7 @@ NOTHING: Final = np.zeros(sum(layer.reach * layer.inputs for layer in LAYERS), n
 
 def _stage(i: int, kernel: Values, memory: Values, frames: int) -> _Stage:
     layer, n = LAYERS[i], frames * values_a_frame(i)
-    columns, item = np.ones((n, len(kernel)), np.float32), memory.itemsize
+    columns, item = np.ones((n, len(kernel)), kernel.dtype), memory.itemsize
     shape, value = (n, layer.taps, layer.inputs), layer.inputs * item
     return _Stage(
         layer=layer,
@@ -236,7 +236,7 @@ def _stage(i: int, kernel: Values, memory: Values, frames: int) -> _Stage:
         seen=as_strided(memory, shape, (value, layer.every * value, item)),
         taps=as_strided(columns, shape, (columns.strides[0], value, item)),
         columns=columns,
-        sums=np.empty((n, layer.outputs), np.float32),
+        sums=np.empty((n, layer.outputs), kernel.dtype),
     )
 
 

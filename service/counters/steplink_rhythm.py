@@ -103,7 +103,10 @@ def correlations(seen: Floats) -> Floats:
 
 
 def refined_hz(rough_hz: Sequence[float], r: Floats) -> list[float]:
-    """Return the cadence that `correlations` have near each frame's `rough_hz`; that itself where they have none."""
+    """Return the cadence that `correlations` have near each frame's `rough_hz`; that itself where they have none.
+
+    `r` is spent by it.
+    """
     lags = (ROWS_HZ / np.array(rough_hz))[:, None] * PERIODS
     whole = np.minimum(lags.astype(np.intp), LAGS - 1)
     lags -= whole
