@@ -225,6 +225,42 @@ GAITS: Final[dict[str, Gait]] = {
             ".085 V½ .23; intervals as normal"
         ),
     ),
+    "very_slow": Gait(
+        cadence_spm=48,
+        interval_sd=0.12,
+        strength_sd=0.25,
+        asymmetry=0.1,
+        vertical_g=(0.115, 0.039, 0.038, 0.037),
+        swing_deg=9.0,
+        arm_deg=5.0,
+        rough_g=0.015,
+        measured="nothing: no recording is as slow. Ours: half the impacts and swing of slow, less regular",
+    ),
+    "trolley": Gait(
+        cadence_spm=100,
+        interval_sd=0.06,
+        strength_sd=0.15,
+        asymmetry=0.05,
+        vertical_g=(0.12, 0.04, 0.03, 0.02),
+        swing_deg=1.0,
+        arm_deg=45.0,
+        rough_g=0.05,
+        measured=(
+            "nothing: no recording of hands on a handle. Ours: a third of still_arm's impacts reach the wrist, the arm "
+            "does not swing, wheels shake it as a car does"
+        ),
+    ),
+    "in_place": Gait(
+        cadence_spm=100,
+        interval_sd=0.06,
+        strength_sd=0.2,
+        asymmetry=0.1,
+        vertical_g=(0.25, 0.08, 0.06, 0.05),
+        swing_deg=5.0,
+        arm_deg=20.0,
+        rough_g=0.03,
+        measured="nothing: no recording of it. Ours: impacts between slow and normal, hardly any swing",
+    ),
 }
 
 MOTIONS: Final[dict[str, Motion]] = {

@@ -1,9 +1,9 @@
-"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `forget`, `evaluate`, `bench`, `counters`.
+"""The commands: `steplink demo`, `serve`, `scan`, `sim`, `forget`, `evaluate`, `bench`, `train`, `counters`.
 
 Ctrl-C or SIGTERM ends each cleanly: with exit code 0 those that go on until they are told to end, with 130 or 143 those
 whose result is then missing. A wrong option, file or port ends a command with one line and exit code 2; no Bluetooth
-with one line and exit code 3; an evaluation without a single count with exit code 1. Nothing heavy is imported before a
-command needs it.
+with one line and exit code 3; an evaluation without a single count, or a fine-tuning that did not help, with exit
+code 1. Nothing heavy is imported before a command needs it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service import cli_evaluation, cli_options
+from service import cli_evaluation, cli_options, cli_training
 from service.cli_output import say, spell_out
 from service.cli_stop import Stopped, stopped_at_once, tell
 from service.config import Settings
@@ -53,6 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.WARNING, format="steplink: %(message)s")
     logging.getLogger("bumble").setLevel(logging.CRITICAL)  # what a lost link leaves behind is no news to a user
     try:
+        _use_weights(options)
         if not options.endless:
             with stopped_at_once():
                 return asyncio.run(options.command(options)) or 0
@@ -68,6 +69,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SteplinkError as error:
         print(f"steplink: {error}", file=sys.stderr)
         return USAGE_ERROR
+
+
+def _use_weights(options: argparse.Namespace) -> None:
+    """Let all that a command counts be counted with the weights it names; ParameterError where they are none."""
+    if "weights" in options:
+        from service.counters import steplink_weights  # noqa: PLC0415
+
+        steplink_weights.use(options.weights)
 
 
 async def _stoppable(work: Coroutine[Any, Any, int | None]) -> int | None:
@@ -342,6 +351,10 @@ def _parser() -> argparse.ArgumentParser:
     cli_options.add_evaluation(evaluate)
     bench = _command(commands, "bench", cli_evaluation.bench, "measure how fast the counters are")
     cli_options.add_bench(bench)
+    train = _command(
+        commands, "train", cli_training.train, "train the network of the counter steplink, or fine-tune it"
+    )
+    cli_training.add_options(train)
     counters = _command(commands, "counters", cli_evaluation.counters, "list the counters, or the parameters of one")
     counters.add_argument("name", metavar="NAME", nargs="?", help="a counter, whose parameters are then listed")
     counters.add_argument("--markdown", action="store_true", help="print all tables as the guide has them")

@@ -32,6 +32,10 @@ async def evaluate(options: argparse.Namespace) -> int:
     from service.evaluation.run import evaluate as run  # noqa: PLC0415
     from service.evaluation.tables import report  # noqa: PLC0415
 
+    if options.scorecard:
+        return await _scorecard(options)
+    if options.guide is not None:
+        raise ParameterError("guide", options.guide, "it is the page of a scorecard: --scorecard is wanted too")
     if options.paper is not None:
         await _evaluate_paper(options)
         return 0
@@ -90,6 +94,36 @@ async def _evaluate_paper(options: argparse.Namespace) -> None:
     json_file.write_json(output, made.as_json())
     say(made.text())
     _draw(folder, made.rows, found, options, made.bars)
+
+
+async def _scorecard(options: argparse.Namespace) -> int:
+    """Print the scorecards of the counters."""
+    from service.evaluation import choices, json_file  # noqa: PLC0415
+    from service.evaluation.progress import ProgressBar  # noqa: PLC0415
+    from service.evaluation.scorecard import page, report, run  # noqa: PLC0415
+    from service.evaluation.scorecard.splits import of_split  # noqa: PLC0415
+
+    for name in ("paper", "calibrate"):
+        if getattr(options, name) is not None:
+            raise ParameterError(name, getattr(options, name), "a scorecard is of counters as they are: leave it out")
+    names, paths = choices.counters_and_paths(options.counter, options.path)
+    chosen = choices.choices(names, options.preset or "tuned", options.param)
+    found, apart = of_split(choices.find(paths, mapping(options), options.rate_hz)[0], options.split)
+    if not found:
+        raise ParameterError("split", options.split, f"none of the {len(apart)} recordings there is of it")
+    output, drawings = json_file.checked_path(options.json), page.checked(options.figures, options.guide)
+    if apart:
+        sets = ", ".join(sorted({file.dataset for file in apart}))
+        print(f"steplink: {len(apart)} recordings of another split left out: {sets}", file=sys.stderr)
+    spread = {"jobs": options.jobs, "lsb_per_g": options.lsb_per_g}
+    with ProgressBar() as progress:
+        rows = await run.measured(found, chosen, **spread, progress=progress)
+    with ProgressBar(of="splices and walkers") as progress:
+        cards = await run.scorecards(rows, chosen, **spread, progress=progress)
+    json_file.write_json(output, (row for card in cards for row in card.as_json()))
+    page.write(drawings, cards)
+    say(report.text(cards))
+    return NOTHING_COUNTED if all(row.error for row in rows) else 0
 
 
 def _figures_folder(options: argparse.Namespace) -> Path | None:

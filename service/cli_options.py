@@ -219,6 +219,7 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         help="let counters learn before they count: `middle`, each recording from its own middle 300 samples"
         " (double_threshold), or a file, a calibration walk (double_threshold, gyro_zero_crossing: as slow as ever)",
     )
+    _add_weights(parser)
     _add_json(parser, "write a row for each recording and counter there")
     parser.add_argument(
         "--paper",
@@ -227,8 +228,12 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
         " synthetic walkers and on recordings of the same conditions (PATH, else those of STEPLINK_DATA)",
     )
     parser.add_argument(
-        "--figures", metavar="DIR", help="draw the papers' figures and the agreement there, as PNG (extra: figures)"
+        "--figures",
+        metavar="DIR",
+        help="draw the papers' figures and the agreement there, as PNG (extra: figures); with --scorecard its own, as"
+        " SVG",
     )
+    _add_scorecard(parser)
     cores = os.cpu_count() or 1
     parser.add_argument(
         "--jobs", type=_whole(1, 256), default=cores, help=f"recordings counted at once (default {cores}, the cores)"
@@ -241,9 +246,31 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_scorecard(parser: argparse.ArgumentParser) -> None:
+    """Add what makes an evaluation a scorecard."""
+    parser.add_argument(
+        "--scorecard",
+        action="store_true",
+        help="tell everything that is asked of a counter: families beside their limits, step-free clips between two"
+        " walks, step times, disturbances, situations, what dominates the error",
+    )
+    parser.add_argument(
+        "--split",
+        metavar="NAME",
+        default="dev",
+        help="with --scorecard: recordings that an index.csv lists with another split are left out (default dev)",
+    )
+    parser.add_argument(
+        "--guide",
+        metavar="FILE",
+        help="with --scorecard: write it there as a page of the guide (.md), its figures (.svg) beside it",
+    )
+
+
 def add_bench(parser: argparse.ArgumentParser) -> None:
     """Add what `bench` takes."""
     _add_counter(parser, "counters to measure, or all (default all)")
+    _add_weights(parser)
     _add_json(parser, "write a list of {name, value, unit} there")
     parser.add_argument(
         "--samples",
@@ -255,6 +282,11 @@ def add_bench(parser: argparse.ArgumentParser) -> None:
 
 def _add_counter(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--counter", nargs="+", action="extend", default=[], metavar="NAME", help=text)
+
+
+def _add_weights(parser: argparse.ArgumentParser) -> None:
+    (field,) = (field for field in dataclasses.fields(Settings) if field.name == "weights")
+    parser.add_argument("--weights", metavar="FILE", default="", help=field.metadata["text"])
 
 
 def _add_json(parser: argparse.ArgumentParser, text: str) -> None:

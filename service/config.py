@@ -27,6 +27,9 @@ class Settings:
         unit="name",
     )
     param: tuple[str, ...] = option((), "a parameter of a counter, NAME.KEY=VALUE; may be repeated", unit="name.key=v")
+    weights: str = option(
+        "", "weights of the counter steplink, a file that `steplink train` made; without it those that come with it"
+    )
     durable_limit: int = option(
         1000, "events that may wait for a slow reader before it is closed", unit="events", low=10, high=100_000
     )

@@ -9,6 +9,7 @@
     ├── LinkError           a link could not be made or was lost; `reason` is a LinkFault
     ├── StoreError          something could not be stored or read; `reason` is a StoreFault
     ├── LearningError       a walk from which a counter's parameters cannot be learnt
+    ├── TrainingError       a network that cannot be trained here, or that came to nothing
     ├── NotNowError         what was asked for is possible, but not at this moment
     ├── UnknownDeviceError  no device of that id
     ├── UnknownPersonError  nobody of that name has data
@@ -132,6 +133,10 @@ class StoreError(SteplinkError):
 
 class LearningError(SteplinkError):
     """A walk from which a counter's parameters cannot be learnt; it says how to walk."""
+
+
+class TrainingError(SteplinkError):
+    """A network that cannot be trained here, or whose training came to nothing; it says what to do."""
 
 
 class NotNowError(SteplinkError):

@@ -1,7 +1,7 @@
 """The guide: the Markdown pages of `service/guide/`, as HTML at `/guide`, for who reads without the source at hand.
 
-A page is named as its file is, with or without `.md`: so the links from one page to another are good here as they are
-on disk.
+A page is named as its file is, with or without `.md`: so the links from one page to another, and to the figures beside
+them, are good here as they are on disk.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from markdown_it import MarkdownIt
 
 _PAGES: Final = files("service") / "guide"
 _ENDING: Final = ".md"
+_DRAWING: Final = ".svg"
 _FRAME: Final = """<!doctype html>
 <html lang="en">
 <head>
@@ -44,6 +45,8 @@ def add_guide(app: FastAPI) -> None:
 
     @app.get("/guide/{name}", include_in_schema=False)
     async def page(name: str) -> Response:
+        if name in _drawings():
+            return Response((_PAGES / name).read_bytes(), media_type="image/svg+xml")
         known = name.removesuffix(_ENDING)
         if known not in names():
             return JSONResponse({"detail": f"no page {name!r}: GET /guide lists them"}, status_code=404)
@@ -53,6 +56,12 @@ def add_guide(app: FastAPI) -> None:
 def names() -> list[str]:
     """Return the names of the guide's pages, in order."""
     return sorted(one.name.removesuffix(_ENDING) for one in _PAGES.iterdir() if one.name.endswith(_ENDING))
+
+
+@functools.cache
+def _drawings() -> frozenset[str]:
+    """Return the names of the figures."""
+    return frozenset(one.name for one in _PAGES.iterdir() if one.name.endswith(_DRAWING))
 
 
 @functools.cache

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from math import exp, log
 from typing import Final
 
@@ -23,6 +21,7 @@ from service.counters import steplink_bouts as bouts
 from service.counters import steplink_fast as fast
 from service.counters import steplink_front as front
 from service.counters import steplink_network as network
+from service.counters import steplink_weights
 from service.counters.contract import Snapshot, check_snapshot, ordered, parameter, params_hash
 from service.counters.steplink_frames import Frames
 from service.counters.streaming import COMPILED_FROM
@@ -46,11 +45,11 @@ _Said = tuple[list[float], list[float], Sequence[Likely], Gait | None]
 class SteplinkParams:
     """Parameters; the defaults are the tuned ones."""
 
-    certain: float = parameter(0.9, unit="probability", low=0.5, high=0.999, text="a frame that makes a walk certain")
+    certain: float = parameter(0.85, unit="probability", low=0.5, high=0.999, text="a frame that makes a walk certain")
     possible: float = parameter(0.4, unit="probability", low=0.05, high=0.9, text="a frame that may be of a walk")
     whole: float = parameter(0.7, unit="probability", low=0.06, high=0.99, text="a frame that credits all its steps")
     least_steps: int = parameter(4, unit="steps", low=1, high=12, text="steps that make a walk certain; all count")
-    evidence: float = parameter(0.0, unit="logits", low=0, high=100, text="how sure the frames are together")
+    evidence: float = parameter(10.0, unit="logits", low=0, high=100, text="how sure the frames are together")
     pause: int = parameter(2, unit="frames", low=0, high=6, text="frames without walking that do not end a walk")
     patience: int = parameter(23, unit="frames", low=4, high=25, text="frames that wait to be credited, of 0.48 s each")
 
@@ -63,8 +62,17 @@ class SteplinkParams:
 TUNED: Final = SteplinkParams()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Built:
+    """What a snapshot must have been made with."""
+
+    params: SteplinkParams
+    weights: str
+    """Their digest."""
+
+
 class SteplinkCounter:
-    """steplink's counter over the grid; see the contract. `weights` are the shipped ones unless others are given."""
+    """steplink's counter over the grid; see the contract. `weights` are those in use unless others are given."""
 
     name = NAME
     version = VERSION
@@ -74,9 +82,11 @@ class SteplinkCounter:
     def __init__(self, params: SteplinkParams = TUNED, weights: network.Weights | None = None) -> None:
         self.params = params
         self.latency_s = latency_s(params)
+        used = steplink_weights.in_use() if weights is None else weights
+        self._built = _Built(params=params, weights=steplink_weights.digest(used))
         self._front = front.fresh()
         self._bouts = _fresh_bouts(params)
-        self._frames = Frames(shipped() if weights is None else weights, self._bouts[bouts.LOW])
+        self._frames = Frames(used, self._bouts[bouts.LOW])
         self._arrays: fast.Arrays | None = None
         """While there are some they hold the state, and `_front`, `_bouts` and the frame's rows are old."""
         self._trace = [0.0] * 16
@@ -113,11 +123,11 @@ class SteplinkCounter:
             "bouts": self._bouts[bouts.CONSTANTS :],
             **self._frames.snapshot(),
         }
-        return {"counter": self.name, "version": self.version, "params": params_hash(self.params), "state": state}
+        return {"counter": self.name, "version": self.version, "params": params_hash(self._built), "state": state}
 
     def restore(self, state: Snapshot) -> None:
         """Take over a snapshot's state; SnapshotError where it is another counter's."""
-        check_snapshot(state, name=self.name, version=self.version, params=self.params)
+        check_snapshot(state, name=self.name, version=self.version, params=self._built)
         self._settle()
         kept = state["state"]
         self._front[front.CONSTANTS :] = map(float, kept["front"])
@@ -240,18 +250,6 @@ def latency_s(p: SteplinkParams) -> float:
     """Return the longest time from a step to its confirmation: all that may wait, a frame, and its answer."""
     frames = p.patience + 1 + network.DELAY
     return (frames * bouts.FRAME + FILTER_DELAY) / GRID_HZ
-
-
-@cache
-def shipped() -> network.Weights:
-    """Return the weights that come with the package."""
-    return load()
-
-
-def load() -> network.Weights:
-    """Read the weights that come with the package."""
-    with resources.files("service.counters").joinpath("steplink_weights.npz").open("rb") as file, np.load(file) as kept:
-        return network.weights_of(dict(kept))
 
 
 def _fresh_bouts(p: SteplinkParams) -> list[float]:

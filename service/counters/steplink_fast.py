@@ -1,8 +1,8 @@
 """steplink's counter with numba: its state as arrays, and the compiled kernel that takes a packet in one call.
 
 Compiling takes seconds. A recording waits for it (`kernel`); a session does not: it goes on plainly until somebody had
-it compiled (`compile_live`), and then as it was, to the same bits. Network and rhythm are shared with the plain way, so to change
-over is to copy a few lists.
+it compiled (`compile_live`), and then as it was, to the same bits. Network and rhythm are shared with the plain way, so
+to change over is to copy a few lists.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def ready() -> Kernel | None:
 
 
 def compile_live() -> None:
-    """Compile, for seconds if nothing was compiled before; then counters go on with the kernel, where numba is there."""
+    """Compile, for seconds if it is the first time; then counters go on with the kernel, where numba is there."""
     made = kernel()
     if made is not None and not _live:
         _live.append(made)

@@ -213,7 +213,7 @@ def refined_hz(rough_hz: float, seen: Floats, found: Floats) -> float:
         if value - COSTS[k] > highest:
             best, highest, similar = k, value - COSTS[k], value
     if 0 < best < CURVE - 1 and similar > ACCEPTED:
-        return rough_hz * FACTORS[best]
+        return rough_hz * float(FACTORS[best])
     return rough_hz
 
 

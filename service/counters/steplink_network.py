@@ -117,11 +117,11 @@ def weights_of(arrays: Mapping[str, NDArray[np.generic]]) -> Weights:
         wanted = (layer.taps * layer.inputs, layer.outputs)
         if kernel.shape != wanted or bias.shape != wanted[1:]:
             raise ValueError(f"layer {i} is {kernel.shape}, {wanted} is wanted")
-        kernels.append(np.vstack((kernel, bias)).astype(np.float32).ravel() * np.float32(_scale(i)))
+        kernels.append(np.vstack((kernel, bias)).astype(np.float32).ravel() * np.float32(scale(i)))
     return Weights(np.concatenate(kernels))
 
 
-def _scale(i: int) -> float:
+def scale(i: int) -> float:
     """Return what makes integers of 1/UNIT of a layer's sums; the last one's stay sums."""
     if i == len(LAYERS) - 1:
         return 1.0

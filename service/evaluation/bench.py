@@ -3,10 +3,10 @@
 All on one core, the best of RUNS (live, of LIVE_RUNS for each stretch of packets), numba's compilation excluded, 50 Hz
 columns of float64 in memory. The signal is a synthetic walk. `offline` counts all of it at once, `fast` with numba and
 `plain` without; `live` counts packets of ten samples, plain as a lone session is, and `a hundred sessions` by turns,
-with numba where it is there, as a service with many devices does. The yardsticks are `find_peaks`, what a textbook does with scipy,
-and `minimal loop`, the same job as one loop of numba that keeps nothing but the number. Chen 2015 prints what its three
-counters took for 5,000 samples, in MATLAB at 2.27 GHz. `with reading and resampling` reads a recording of all sensors
-at 100 Hz and puts it on the grid first; beside that the counters hardly differ.
+with numba where it is there, as a service with many devices does. The yardsticks are `find_peaks`, what a textbook does
+with scipy, and `minimal loop`, the same job as one loop of numba that keeps nothing but the number. Chen 2015 prints
+what its three counters took for 5,000 samples, in MATLAB at 2.27 GHz. `with reading and resampling` reads a recording
+of all sensors at 100 Hz and puts it on the grid first; beside that the counters hardly differ.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from service.counters import registry, steplink, steplink_fast
+from service.counters import registry, steplink, steplink_fast, steplink_weights
 from service.counters.contract import RecordingCounter, StepCounter
 from service.evaluation import yardsticks
 from service.evaluation.counting import grid_block, pieces, streamed
@@ -69,7 +69,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One measured value; units are `samples/s` of the 50 Hz grid, `us/packet` of ten samples, `ms`, and `ratio`."""
+    """One measured value; units are `samples/s` of the 50 Hz grid, `us/packet` of ten samples, `ms` and `ratio`."""
 
     name: str
     value: float
@@ -85,9 +85,9 @@ def figures(counters: Sequence[str], samples: int = SAMPLES) -> Iterator[Figure]
         yield _live(f"{name} live", partial(registry.make, name), block)
         if name in PAPER_S:
             yield _paper(name, block)
-    if steplink.NAME in counters:
-        yield _model()
-        yield _sessions(steplink.NAME, block)
+        if name == steplink.NAME:
+            yield Figure(name="model load", value=1e3 * best_s(steplink_weights.unpacked), unit="ms")
+            yield _sessions(name, block)
     yield _live_packets()
     if available():
         yield from _from_file(counters, yardsticks.head(block, samples // FILE_SHARE))
@@ -162,11 +162,6 @@ def _paper(name: str, block: SampleBlock) -> Figure:
 def _live(name: str, make: Callable[[], StepCounter], block: SampleBlock) -> Figure:
     parts = pieces(yardsticks.head(block, (LIVE_FROM + LIVE_PACKETS) * PACKET_SAMPLES), PACKET_SAMPLES)
     return _per_packet(name, parts, lambda: make().update)
-
-
-def _model() -> Figure:
-    """Read the weights that come with the package."""
-    return Figure(name=f"{steplink.NAME} model loads", value=best_s(steplink.load) * 1e3, unit="ms")
 
 
 def _sessions(name: str, block: SampleBlock) -> Figure:

@@ -23,7 +23,7 @@ TOLERANCE_S: Final = 0.15
 SECONDS_PER_HOUR: Final = 3600.0
 
 
-def accuracy_percent(counted: int, true: int) -> float:
+def accuracy_percent(counted: float, true: int) -> float:
     """Return 100 (1 − |error|/true); below 0 where more than twice the true steps are counted. `true` is above 0.
 
     >>> accuracy_percent(95, 100), accuracy_percent(105, 100), accuracy_percent(300, 100)
@@ -32,7 +32,7 @@ def accuracy_percent(counted: int, true: int) -> float:
     return 100.0 - error_percent(counted, true)
 
 
-def error_percent(counted: int, true: int) -> float:
+def error_percent(counted: float, true: int) -> float:
     """Return 100 |error|/true. `true` is above 0.
 
     >>> error_percent(9, 12)

@@ -6,13 +6,9 @@ cannot be counted (a damaged file, a missing sensor, a rate under 10 Hz) is a ro
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-import multiprocessing
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from collections.abc import Sequence
 from dataclasses import asdict, replace
+from functools import partial
 
 from service.counters import registry
 from service.errors import SteplinkError
@@ -20,13 +16,11 @@ from service.evaluation.calibration import taught
 from service.evaluation.choices import Found
 from service.evaluation.counting import count, grid_block
 from service.evaluation.metrics import Times, match, metronome_s
+from service.evaluation.pool import ENDED, Progress, mapped
 from service.evaluation.rows import Choice, Row
 from service.evaluation.saturation import saturated
 from service.recordings import Recording, read
 from service.samples import SampleBlock
-
-Progress = Callable[[int, int], None]
-"""Is told how many recordings are done, and of how many."""
 
 
 async def evaluate(
@@ -36,54 +30,14 @@ async def evaluate(
 
     `lsb_per_g` scales recordings in raw units. When cancelled, it ends its processes and returns at once.
     """
-    # Not forked: threads of numba and asyncio do not outlive that.
-    pool = ProcessPoolExecutor(min(jobs, len(found)), mp_context=multiprocessing.get_context("spawn"))
-    done = 0
-
-    async def rows(file: Found, future: Future[list[Row]]) -> list[Row]:
-        nonlocal done
-        try:
-            made = await _result(future)
-        except BrokenExecutor:
-            made = failed_rows(file, chosen, "the process that counted it ended: is there memory enough for --jobs?")
-        done += 1
-        progress(done, len(found))
-        return made
-
-    try:
-        with _ctrl_c_ignored():
-            futures = [pool.submit(rows_of, file, chosen, lsb_per_g) for file in found]
-        by_file = await asyncio.gather(*(rows(file, future) for file, future in zip(found, futures, strict=True)))
-        pool.shutdown()  # waited for: a pool that is still ending when Python ends may fail there
-        return [row for made in by_file for row in made]
-    except (asyncio.CancelledError, KeyboardInterrupt):
-        for process in multiprocessing.active_children():
-            process.terminate()
-        pool.shutdown(cancel_futures=True)  # waited for: what it says of the ended processes goes to a loop that runs
-        raise
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-async def _result(future: Future[list[Row]]) -> list[Row]:
-    """Return what the pool makes; when cancelled, leave the future to the pool.
-
-    Its thread tells every future that its process ended, and fails with a traceback where one is cancelled by then.
-    """
-    made = asyncio.wrap_future(future)
-    made.add_done_callback(lambda each: each.cancelled() or each.exception())  # heard, also where nobody waits any more
-    await asyncio.wait([made])
-    return made.result()
-
-
-@contextlib.contextmanager
-def _ctrl_c_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C meanwhile: a process started here never heeds it, and leaves it to this one."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+    by_file = await mapped(
+        partial(rows_of, chosen=chosen, lsb_per_g=lsb_per_g),
+        found,
+        jobs=jobs,
+        progress=progress,
+        ended=lambda file: failed_rows(file, chosen, ENDED),
+    )
+    return [row for made in by_file for row in made]
 
 
 def rows_of(file: Found, chosen: Sequence[Choice], lsb_per_g: float) -> list[Row]:

@@ -10,8 +10,9 @@
 
 `x_g,y_g,z_g` must be there; `time_s` (seconds) or a rate, in the file or declared by the caller, too. Optional are
 `gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s` and `mag_x_ut,mag_y_ut,mag_z_ut`. Other columns are ignored. The lines of
-`# key: value` before the header are optional: `rate_hz`, `true_steps`, `step_t_s` (blanks between), `placement`,
-`activity`, `subject`, `quality`. UTF-8, decimal points, commas between columns.
+`# key: value` before the header are optional: `rate_hz`, `true_steps`, `steps_range` (`80 120`: from 80 to 120),
+`step_t_s` (blanks between), `placement`, `activity`, `subject`, `quality`. UTF-8, decimal points, commas between
+columns.
 """
 
 from __future__ import annotations
@@ -74,7 +75,11 @@ def read_csv(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recordin
         mag_ut=mag_ut,
         step_t_s=_step_times(path, about),
         true_steps=_true_steps(path, about),
-        **{name: about.get(name) for name in TEXTS},
+        steps_range=_steps_range(path, about),
+        placement=about.get("placement"),
+        activity=about.get("activity"),
+        subject=about.get("subject"),
+        quality=about.get("quality"),
     )
 
 
@@ -85,6 +90,8 @@ def write_csv(recording: Recording, path: str | Path) -> None:
     """
     texts = {name: getattr(recording, name) for name in TEXTS}
     about: dict[str, object] = {"rate_hz": float(recording.rate_hz), "true_steps": recording.true_steps}
+    if recording.steps_range is not None:
+        about["steps_range"] = " ".join(map(str, recording.steps_range))
     if recording.step_t_s is not None:
         about["step_t_s"] = " ".join(map(repr, recording.step_t_s.tolist()))
     about |= {name: _folded(text) for name, text in texts.items() if text is not None}
@@ -157,3 +164,13 @@ def _true_steps(path: Path, about: dict[str, str]) -> int | None:
     if not text.isdecimal():
         raise RecordingError(str(path), f"# true_steps: {text!r} is no whole number")
     return int(text)
+
+
+def _steps_range(path: Path, about: dict[str, str]) -> tuple[int, int] | None:
+    text = about.get("steps_range")
+    if text is None:
+        return None
+    cells = text.split()
+    if len(cells) != 2 or not all(cell.isdecimal() for cell in cells):
+        raise RecordingError(str(path), f"# steps_range: {text!r}; two whole numbers with a blank between are wanted")
+    return int(cells[0]), int(cells[1])

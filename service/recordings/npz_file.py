@@ -1,7 +1,7 @@
 """numpy archives: `t` (s), `acc` (n×3, g), `gyro` (n×3, deg/s), `mag` (n×3, µT), `step_t` (s) and a few scalars.
 
-The scalars are `rate_hz`, `true_steps`, `placement`, `activity`, `subject` and `gt_quality`; only `t` and `acc` must
-be there. Arrays of Python objects are refused: reading a recording never runs code.
+The scalars are `rate_hz`, `true_steps`, `steps_min`, `steps_max`, `placement`, `activity`, `subject` and `gt_quality`;
+only `t` and `acc` must be there. Arrays of Python objects are refused: reading a recording never runs code.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ def read_npz(path: Path, *, lsb_per_g: float, rate_hz: float | None) -> Recordin
         mag_ut=mag_ut,
         step_t_s=_floats(path, arrays, "step_t"),
         true_steps=None if steps is None else round(steps),
+        steps_range=_range(path, arrays),
         placement=_text(arrays, "placement"),
         activity=_text(arrays, "activity"),
         subject=_text(arrays, "subject"),
@@ -95,6 +96,11 @@ def _number(path: Path, arrays: Mapping[str, Array], name: str) -> float | None:
     if values.size != 1 or not np.isfinite(values).all():
         raise RecordingError(str(path), f"{name} is {values.tolist()}, not one finite number")
     return float(values.reshape(()))
+
+
+def _range(path: Path, arrays: Mapping[str, Array]) -> tuple[int, int] | None:
+    low, high = (_number(path, arrays, name) for name in ("steps_min", "steps_max"))
+    return None if low is None or high is None else (round(low), round(high))
 
 
 def _text(arrays: Mapping[str, Array], name: str) -> str | None:

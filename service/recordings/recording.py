@@ -41,8 +41,8 @@ class Recording:
 
     `t_s` (n, seconds, rising) stands beside `acc_g` (n×3), `gyro_rad_s` and `mag_ut` (n×3 or None); `rate_hz` is the
     nominal rate. `step_t_s` are the true times of steps in the time of `t_s`, `true_steps` their number; each is None
-    where unknown, and the number may be known without the times. `quality` is A where the truth is trusted, B where
-    it is approximate.
+    where unknown, and the number may be known without the times; `steps_range` is what it may be, the limits included,
+    where that is all the wearer knew. `quality` is A where the truth is trusted, B where it is approximate.
     """
 
     path: Path
@@ -53,6 +53,7 @@ class Recording:
     mag_ut: Floats | None = None
     step_t_s: Floats | None = None
     true_steps: int | None = None
+    steps_range: tuple[int, int] | None = None
     placement: str | None = None
     activity: str | None = None
     subject: str | None = None
@@ -116,6 +117,8 @@ class Recording:
     def _check_truth(self) -> None:
         if self.true_steps is not None and self.true_steps < 0:
             raise self._fail(f"{self.true_steps} true steps; leave the number out where it is unknown")
+        if self.steps_range is not None and not 0 <= self.steps_range[0] <= self.steps_range[1]:
+            raise self._fail(f"{self.steps_range} is no range of steps; the lower number comes first")
         times = self.step_t_s
         if times is not None and (times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any()):
             raise self._fail("step times must be finite seconds in rising order")

@@ -43,7 +43,26 @@ async def test_every_link_leads_somewhere(name):
             assert (await lab.http.get(path)).status_code == 200, link
 
 
-@pytest.mark.parametrize("name", ["nothing", "..%2f..%2fpyproject", "calibration.md.md", "%2e%2e", "calibration%00"])
+async def test_a_figure_of_a_page_is_a_drawing_with_the_pages_headers():
+    (first, *_) = re.findall(r'<img src="([^"]+)"', (await get("/guide/accuracy")).text)
+    answer = await get(f"/guide/{first}")
+    assert answer.headers["content-type"] == "image/svg+xml"
+    assert "default-src 'self'" in answer.headers["content-security-policy"]
+    assert answer.text.startswith("<svg")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "nothing",
+        "accuracy_nothing.svg",
+        "..%2fapi%2fweb%2ficon.svg",
+        "..%2f..%2fpyproject",
+        "calibration.md.md",
+        "%2e%2e",
+        "calibration%00",
+    ],
+)
 async def test_no_other_file_is_served(name):
     answer = await get(f"/guide/{name}")
     assert answer.status_code == 404

@@ -1,4 +1,4 @@
-"""steplink's own counter: what it says of synthetic walks and of other motion, and that its bits never depend on how."""
+"""steplink's own counter: what it says of synthetic walks and of other motion; its bits depend on nothing else."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from device_sim.gait import Walker
-from service.counters import registry, steplink
+from service.counters import registry, steplink, steplink_weights
 from service.counters import steplink_bouts as bouts
 from service.counters import steplink_front as front
 from service.counters import steplink_network as network
@@ -119,7 +119,7 @@ def rows_of(values):
 def test_frames_alone_and_together_give_the_same_bits(rows):
     sensed = rows[: len(rows) // 12 * 12, : front.SENSED]
     frames = len(sensed) // 12
-    together, alone, begun = (network.Stream(steplink.shipped(), n) for n in (frames, 1, 1))
+    together, alone, begun = (network.Stream(steplink_weights.shipped().weights, n) for n in (frames, 1, 1))
     logits = together.run(sensed)
     assert np.array_equal(logits, np.concatenate([alone.run(sensed[12 * i : 12 * i + 12]) for i in range(frames)]))
     assert np.array_equal(logits, np.concatenate([begun.run(sensed[:60]), begun.run(sensed[60:])]))
@@ -131,7 +131,7 @@ def test_frames_alone_and_together_give_the_same_bits(rows):
 @settings(max_examples=20, deadline=None)
 @given(sensed=hnp.arrays(np.float64, (36, front.SENSED), elements=st.sampled_from([-1023.0, 0.0, 1.0, 1023.0])))
 def test_no_sum_of_the_network_is_too_large_to_be_exact(sensed):
-    weights = steplink.shipped()
+    weights = steplink_weights.shipped().weights
     exact = network.Weights(weights.flat.astype(np.float64))
     assert np.array_equal(network.Stream(weights, 3).run(sensed), network.Stream(exact, 3).run(sensed))
 

@@ -154,7 +154,7 @@ async def test_a_process_that_dies_leaves_rows_that_say_so(tmp_path, monkeypatch
     assert "memory enough" in rows[0].error
 
 
-def _die(*_):
+def _die(*_, **__):
     os._exit(9)
 
 
@@ -167,7 +167,7 @@ async def test_a_pool_that_ends_late_says_nothing_when_cancelled(tmp_path, monke
             time.sleep(0.5)
             super().shutdown(wait, cancel_futures=cancel_futures)
 
-    monkeypatch.setattr("service.evaluation.run.ProcessPoolExecutor", Late)
+    monkeypatch.setattr("service.evaluation.pool.ProcessPoolExecutor", Late)
     failed = []
     monkeypatch.setattr(threading, "excepthook", lambda told: failed.append(told.exc_value))
     asyncio.get_running_loop().set_exception_handler(lambda _, told: failed.append(told))

@@ -73,6 +73,7 @@ def test_without_time_a_rate_makes_it(tmp_path):
         (GOOD.replace("1.1", "9.9").replace(",1\n", ",9.81\n").replace("0.9", "9.7"), "m/s²"),
         ("# rate_hz: fast\n" + GOOD, "'fast' is no rate"),
         ("# true_steps: 1.5\n" + GOOD, "'1.5' is no whole number"),
+        ("# steps_range: 80\n" + GOOD, "'80'; two whole numbers"),
         ("# step_t_s: 1,2\n" + GOOD, "'1,2' is no time"),
         (b"time_s,x_g,y_g,z_g\n\xff", "byte 19 is no UTF-8"),
     ],
@@ -102,6 +103,7 @@ def recordings(draw):
         mag_ut=draw(st.none() | triples(n, 1e9)),
         step_t_s=None if steps is None else np.array(steps, dtype=np.float64),
         true_steps=draw(st.none() | st.integers(0, 10**9)),
+        steps_range=draw(st.none() | st.tuples(st.integers(0, 100), st.integers(100, 10**9))),
         **{name: draw(words) for name in ("placement", "activity", "subject", "quality")},
     )
 
@@ -117,7 +119,7 @@ def test_a_round_trip_gives_the_same_bits(recording):
         before, after = getattr(recording, name), getattr(again, name)
         assert (before is None) == (after is None), name
         assert before is None or np.array_equal(before, after), name
-    for name in ("rate_hz", "true_steps", "placement", "activity", "subject", "quality"):
+    for name in ("rate_hz", "true_steps", "steps_range", "placement", "activity", "subject", "quality"):
         assert getattr(recording, name) == getattr(again, name), name
 
 

@@ -28,6 +28,8 @@ def test_units_and_scalars(tmp_path):
         mag=np.full((N, 3), 48.0),
         step_t=np.array([0.05, 0.15]),
         true_steps=2,
+        steps_min=1.0,
+        steps_max=3.0,
         placement="wrist",
         activity="walk",
         subject="s1",
@@ -39,7 +41,7 @@ def test_units_and_scalars(tmp_path):
     assert np.allclose(recording.gyro_rad_s, np.pi)
     assert (recording.mag_ut == 48).all()
     assert recording.step_t_s.tolist() == [0.05, 0.15]
-    assert (recording.true_steps, recording.quality) == (2, "A")
+    assert (recording.true_steps, recording.steps_range, recording.quality) == (2, (1, 3), "A")
     assert (recording.placement, recording.activity, recording.subject) == ("wrist", "walk", "s1")
 
 
@@ -47,7 +49,7 @@ def test_only_time_and_acceleration_must_be_there(tmp_path):
     recording = read(saved(tmp_path / "a.npz", rate_hz=None))
     assert recording.rate_hz == pytest.approx(100)
     optional = (recording.gyro_rad_s, recording.mag_ut, recording.step_t_s, recording.true_steps, recording.placement)
-    assert optional == (None,) * 5
+    assert (*optional, recording.steps_range) == (None,) * 6
 
 
 def test_repeated_stamps_are_merged_in_every_array(tmp_path):

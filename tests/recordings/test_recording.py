@@ -46,6 +46,7 @@ def test_a_sound_recording_knows_its_length():
         ({"rate_hz": 0.0}, "a rate of 0.0 Hz"),
         ({"rate_hz": np.nan}, "a rate of nan Hz"),
         ({"true_steps": -1}, "-1 true steps"),
+        ({"steps_range": (120, 80)}, "the lower number comes first"),
         ({"step_t_s": np.array([2.0, 1.0])}, "rising order"),
         ({"step_t_s": np.array([np.nan])}, "finite seconds"),
     ],

@@ -15,7 +15,8 @@ from service.evaluation.papers.conditions import Paper
 from service.evaluation.papers.real import Measured, choice, measured, methods, wanted
 from service.evaluation.papers.report import Report
 from service.evaluation.papers.results import Result, results, timings, walkers
-from service.evaluation.run import Progress, evaluate
+from service.evaluation.pool import Progress
+from service.evaluation.run import evaluate
 
 DATA: Final = "STEPLINK_DATA"
 PRESET: Final = "paper"

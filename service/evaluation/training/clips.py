@@ -30,6 +30,12 @@ CLIP_FRAMES: Final = 250
 CLIP: Final = CLIP_FRAMES * FRAME
 SPANS: Final = 4
 """Recordings of known number in one clip."""
+SHORT_SHARE: Final = 0.2
+"""Pieces of walks with known step times that are a few steps and then a stand."""
+SWUNG_SHARE: Final = 0.5
+"""Of the same at the body, those that are hung on an arm."""
+DOUBTED: Final = 0.4
+"""Weight of a truth that is approximate."""
 SMOOTH_SHARE: Final = 0.15
 """Clips whose roughness is made less, or nothing."""
 PAUSE_S: Final = 1.6
@@ -87,6 +93,17 @@ class _Label:
         return self.length - self.samples
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Piece:
+    """What goes into a clip of a recording; `short`: a few steps, after which one stands."""
+
+    acc_g: Floats
+    weight: float
+    step_s: Floats = field(default_factory=lambda: np.empty(0))
+    number: float = 0.0
+    short: bool = False
+
+
 class Sampler:
     """Draws clips: sources by weight, recordings within a source evenly."""
 
@@ -109,48 +126,62 @@ class Sampler:
         return self._finished(made, frames)
 
     def _add(self, made: _Label, one: Material) -> None:
-        rng = self.rng
-        factor, strength = motion.pace(rng)
+        """Add a recording, or a part of it, at another pace and strength, as another sensor has it."""
+        factor, strength = motion.pace(self.rng)
         counted = one.step_s is None and one.true_steps > 0
-        acc_g, step_s = one.acc_g, np.empty(0) if one.step_s is None else one.step_s
-        number, weight = float(one.true_steps), 1.0 if one.trusted else 0.4
-        if counted and len(acc_g) > WHOLE_S * GRID_HZ and made.left() > HALF_CLIP:
-            acc_g, number, weight = self._part(one, round(made.left() * factor))
-        elif counted and (len(acc_g) / factor > made.left() or len(made.spans) >= SPANS):
-            self._fill(made)
+        piece = self._whole(made, one, factor) if counted else self._cut(made, one, factor)
+        if piece is None:
+            self._stand(made, made.left())
             return
-        elif not counted:
-            longest = round(min(made.left(), rng.uniform(15.0, 100.0) * GRID_HZ) * factor)
-            if len(acc_g) > longest:
-                begin = int(rng.integers(len(acc_g) - longest + 1))
-                acc_g = acc_g[begin : begin + longest]
-                inside = (step_s >= begin / GRID_HZ) & (step_s < (begin + longest) / GRID_HZ)
-                step_s = step_s[inside] - begin / GRID_HZ
-        if one.step_s is not None and one.source != SYNTHETIC and not one.at_wrist and rng.random() < 0.5:
-            acc_g = motion.with_arm_swing(acc_g, step_s, rng)
+        acc_g, step_s = piece.acc_g, piece.step_s
+        if one.step_s is not None and one.source != SYNTHETIC and not one.at_wrist and self.rng.random() < SWUNG_SHARE:
+            acc_g = motion.with_arm_swing(acc_g, step_s, self.rng)
+        if not one.true_steps and self.rng.random() < 0.5:
+            strength *= float(np.exp(self.rng.uniform(np.log(0.5), np.log(1.8))))
         if strength != 1.0:
             acc_g = motion.strengthened(acc_g, strength)
         if factor != 1.0:
             acc_g, step_s = motion.stretched(acc_g, factor), step_s / factor
-        acc_g = acc_g[: made.left()]
         first = made.samples
-        self._join(made, motion.as_sensed(acc_g, rng))
-        last = made.samples
+        self._join(made, motion.as_sensed(acc_g[: made.left()], self.rng))
         if counted:
-            made.spans.append((first, last, number, weight))
+            made.spans.append((first, made.samples, piece.number, piece.weight))
         else:
-            made.known.append((first, last, weight if one.step_s is not None or not one.true_steps else 0.0))
+            made.known.append((first, made.samples, piece.weight))
             made.step_s.append(step_s + first / GRID_HZ)
+        if piece.short:
+            self._stand(made, round(self.rng.uniform(2.0, 7.0) * GRID_HZ))
 
-    def _part(self, one: Material, longest: int) -> tuple[Floats, float, float]:
-        """Return a part of a long walk of which only the number is known, and its share of it: the pace is even."""
-        n = min(longest, len(one.acc_g))
-        begin = int(self.rng.integers(len(one.acc_g) - n + 1))
-        return one.acc_g[begin : begin + n], one.true_steps * n / len(one.acc_g), 0.4
+    def _whole(self, made: _Label, one: Material, factor: float) -> _Piece | None:
+        """Return a walk of which only the number is known, or a part of a long one; None where it has no room."""
+        weight = 1.0 if one.trusted else DOUBTED
+        if len(one.acc_g) > WHOLE_S * GRID_HZ and made.left() > HALF_CLIP:
+            n = min(round(made.left() * factor), len(one.acc_g))
+            begin = int(self.rng.integers(len(one.acc_g) - n + 1))
+            number = one.true_steps * n / len(one.acc_g)  # the pace is taken to be even
+            return _Piece(acc_g=one.acc_g[begin : begin + n], number=number, weight=DOUBTED)
+        if len(one.acc_g) / factor > made.left() or len(made.spans) >= SPANS:
+            return None
+        return _Piece(acc_g=one.acc_g, number=float(one.true_steps), weight=weight)
 
-    def _fill(self, made: _Label) -> None:
-        """Rest until the clip's end."""
-        n = made.left()
+    def _cut(self, made: _Label, one: Material, factor: float) -> _Piece:
+        """Return a part of a recording whose step times are known, or that has no step."""
+        rng = self.rng
+        weight = 1.0 if one.trusted else DOUBTED
+        short = one.step_s is not None and rng.random() < SHORT_SHARE
+        wanted_s = rng.uniform(2.5, 8.0) if short else rng.uniform(15.0, 100.0)
+        longest = round(min(made.left(), wanted_s * GRID_HZ) * factor)
+        acc_g, step_s = one.acc_g, np.empty(0) if one.step_s is None else one.step_s
+        if len(acc_g) > longest:
+            begin = int(rng.integers(len(acc_g) - longest + 1))
+            acc_g = acc_g[begin : begin + longest]
+            inside = (step_s >= begin / GRID_HZ) & (step_s < (begin + longest) / GRID_HZ)
+            step_s = step_s[inside] - begin / GRID_HZ
+        return _Piece(acc_g=acc_g, step_s=step_s, weight=weight, short=short)
+
+    def _stand(self, made: _Label, samples: int) -> None:
+        """Stand still for a while, turned as the last samples were."""
+        n = min(samples, made.left())
         direction = self.rng.standard_normal(3)
         direction /= np.linalg.norm(direction)
         if made.acc:

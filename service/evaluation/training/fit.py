@@ -16,17 +16,9 @@ from numpy.typing import NDArray
 
 from service.evaluation.training import model
 from service.evaluation.training.clips import Clip, Sampler
+from service.evaluation.training.recipe import AVERAGED, BATCH, DECAY, EXACT_FROM, HIGHEST_RATE, STEPS
 
-BATCH: Final = 24
-STEPS: Final = 1500
-HIGHEST_RATE: Final = 4e-3
-DECAY: Final = 1e-3
-EXACT_FROM: Final = 0.5
-"""Share of the steps after which rounding begins."""
 FIELDS: Final = tuple(Clip.__dataclass_fields__)
-
-AVERAGED: Final = 0.99
-"""Share of the running mean of the weights that stays at each step; the mean is what ships."""
 
 Told = Callable[[int, float], None]
 
@@ -36,11 +28,30 @@ def fit(
     *,
     steps: int = STEPS,
     seed: int = 1,
-    start: dict[str, NDArray[Any]] | None = None,
+    start: model.Params | None = None,
     rate: float = HIGHEST_RATE,
     told: Told = lambda _step, _loss: None,
 ) -> model.Params:
     """Return fitted weights in plain units; `told` hears of each step's loss."""
+    params: model.Params = {}
+    for number, value, params in course(sampler, steps=steps, seed=seed, start=start, rate=rate):  # noqa: B007  # the last
+        told(number, value)
+    return params
+
+
+def course(
+    sampler: Sampler,
+    *,
+    steps: int,
+    seed: int,
+    start: model.Params | None = None,
+    rate: float = HIGHEST_RATE,
+    exact_from: float = EXACT_FROM,
+) -> Iterator[tuple[int, float, model.Params]]:
+    """Yield each step's number from 1 on, the loss before it and the running mean of the weights, in plain units.
+
+    Rounding begins after the share `exact_from` of the steps.
+    """
     params = model.fresh(seed) if start is None else start
     schedule = optax.cosine_onecycle_schedule(steps, rate, pct_start=0.2)
     optimiser = optax.chain(optax.clip_by_global_norm(1.0), optax.adamw(schedule, weight_decay=DECAY))
@@ -50,11 +61,9 @@ def fit(
     key = jax.random.PRNGKey(seed)
     for number, clips in enumerate(batches(sampler, steps)):
         key, now = jax.random.split(key)
-        params, state, value = advance[number >= EXACT_FROM * steps](params, state, clips, now)
-        share = min(AVERAGED, number / (number + 10.0))
-        average = mean(average, params, share)
-        told(number + 1, float(value))
-    return average
+        params, state, value = advance[number >= exact_from * steps](params, state, clips, now)
+        average = mean(average, params, min(AVERAGED, number / (number + 10.0)))
+        yield number + 1, float(value), average
 
 
 @jax.jit

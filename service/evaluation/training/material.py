@@ -6,16 +6,14 @@ truth is approximate, and weighs less.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from service.evaluation.choices import Found
 from service.evaluation.counting import grid_block
-from service.recordings import read
+from service.evaluation.training import motion
 from service.recordings.recording import Recording
 from service.samples import GRID_HZ
 
@@ -24,6 +22,8 @@ UNSTATED: Final = frozenset({"eth2023_wrist", "eth2022_wrist", "brajdic_walk", "
 
 SYNTHETIC: Final = "device_sim"
 """The source of synthetic walks."""
+EXERCISES: Final = "exercises"
+"""The source of synthetic arm motion without a step."""
 
 WALKS: Final = (
     "rest:6,normal:25,rest:4,slow:25,rest:5,fast:20,gesture:8",
@@ -32,6 +32,8 @@ WALKS: Final = (
     "brush:20,rest:4,normal:8,wave:12,rest:3,slow:30",
     "rest:5,uphill:20,downhill:20,knock:8,rest:5,normal:6,rest:8,normal:6",
     "sit:8,rest:6,stand:8,slow:20,normal:20,fast:20,run:10",
+    "rest:6,very_slow:40,rest:6,trolley:30,rest:5,in_place:25",
+    "rest:5,normal:3,rest:5,slow:4,rest:6,fast:3,rest:5,normal:5,rest:6,pocket:4,rest:5,slow:6,type:8,normal:4,rest:6",
 )
 """What the synthetic wearers do, in seconds each."""
 
@@ -43,12 +45,14 @@ WEIGHTS: Final = {
     "banglejs_walk/walk": 0.08,
     "oxford_opt/walk": 0.28,
     "dcaiti/walk": 0.04,
-    "negatives_spar_watch/still": 0.12,
+    "negatives_spar_watch/still": 0.14,
     "negatives_hmp/still": 0.13,
     "negatives_hmp/doubt": 0.03,
     "negatives_banglejs/still": 0.05,
     "pebble_wrist/still": 0.08,
-    "device_sim/walk": 0.05,
+    "device_sim/walk": 0.07,
+    "device_sim/still": 0.05,
+    "exercises/still": 0.13,
 }
 """How often a piece of a clip is of a pool: half of the walks of the wrist, and all that was hard to refuse often."""
 
@@ -73,6 +77,11 @@ class Material:
     true_steps: int
     step_s: Floats | None = None
     trusted: bool = True
+    recording: str = ""
+    """Its file's name, without the ending."""
+    quality: str | None = None
+    steps_range: tuple[int, int] | None = None
+    """What the number of steps may be, where that is all its wearer knew."""
 
     @property
     def duration_s(self) -> float:
@@ -85,15 +94,9 @@ class Material:
         return self.placement.startswith("wrist")
 
 
-def load(found: Sequence[Found]) -> list[Material]:
-    """Read recordings and put them on the grid; those without a true number of steps teach nothing and are left out."""
-    read_all = ((file, read(file.path)) for file in found)
-    return [material(file.dataset, recording) for file, recording in read_all if _true(recording) is not None]
-
-
 def material(source: str, recording: Recording) -> Material:
     """Return one recording as material; its true number of steps is known."""
-    true = _true(recording)
+    true = true_steps(recording)
     assert true is not None  # noqa: S101  # the caller has looked
     doubtful = recording.quality == "B" and not true and recording.duration_s < DOUBTFUL_S
     times = recording.step_t_s
@@ -106,13 +109,32 @@ def material(source: str, recording: Recording) -> Material:
         true_steps=true,
         step_s=None if times is None or not len(times) else times - recording.t_s[0],
         trusted=not doubtful,
+        recording=recording.path.stem,
+        quality=recording.quality,
+        steps_range=recording.steps_range,
     )
 
 
-def _true(recording: Recording) -> int | None:
+def true_steps(recording: Recording) -> int | None:
+    """Return how many steps a recording holds, None where it does not say."""
     if recording.true_steps is None and recording.step_t_s is not None:
         return len(recording.step_t_s)
     return recording.true_steps
+
+
+def exercises(number: int, *, seed: int) -> list[Material]:
+    """Return synthetic arm motion without a step, a minute each."""
+    return [
+        Material(
+            source=EXERCISES,
+            subject=f"arm {one}",
+            placement="wrist",
+            activity="exercise",
+            acc_g=motion.exercise(60.0, np.random.default_rng([seed, one])),
+            true_steps=0,
+        )
+        for one in range(number)
+    ]
 
 
 def synthetic(wearers: int, *, seed: int) -> list[Material]:

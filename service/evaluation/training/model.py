@@ -7,6 +7,7 @@ with.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import jax
@@ -113,6 +114,16 @@ def integers(params: Params) -> dict[str, NDArray[np.int32]]:
         kernel = np.clip(np.rint(np.asarray(params[f"kernel{i}"]) * WEIGHT_UNIT), -WEIGHT_LIMIT, WEIGHT_LIMIT)
         bias = np.clip(np.rint(np.asarray(params[f"bias{i}"]) * (WEIGHT_UNIT * unit)), -BIAS_LIMIT, BIAS_LIMIT)
         out[f"kernel{i}"], out[f"bias{i}"] = kernel.astype(np.int32), bias.astype(np.int32)
+    return out
+
+
+def plain(arrays: Mapping[str, NDArray[Any]]) -> Params:
+    """Return weights in plain units, to be fitted further, of those that the counter has."""
+    out: Params = {}
+    for i in range(len(LAYERS)):
+        unit = front.UNIT if i == 0 else UNIT
+        out[f"kernel{i}"] = jnp.asarray(np.asarray(arrays[f"kernel{i}"]) / WEIGHT_UNIT, jnp.float32)
+        out[f"bias{i}"] = jnp.asarray(np.asarray(arrays[f"bias{i}"]) / (WEIGHT_UNIT * unit), jnp.float32)
     return out
 
 

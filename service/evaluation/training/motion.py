@@ -144,6 +144,38 @@ def roughened(acc_g: Floats, rng: Rng) -> Floats:
     )
 
 
+def exercise(duration_s: float, rng: Rng) -> Floats:
+    """Return what a wrist measures while its arm turns to and fro in a rhythm, and nobody steps.
+
+    The arm turns about two axes; the wrist, at the end of a radius, feels gravity turn and its own motion. What a step
+    adds is not there: the body's bounce.
+    """
+    n = round(duration_s * GRID_HZ)
+    t_s = np.arange(n) / GRID_HZ
+    rate_hz = np.exp(rng.uniform(np.log(0.25), np.log(4.0)))
+    knots = np.arange(0.0, duration_s + 6.0, 4.0)
+    drift = np.interp(t_s, knots, np.exp(0.08 * rng.standard_normal(len(knots))))
+    phase = 2 * np.pi * np.cumsum(rate_hz * drift) / GRID_HZ
+    size = np.interp(t_s, knots, np.exp(0.2 * rng.standard_normal(len(knots))) * (rng.random(len(knots)) > 0.12))
+    radius_m = rng.uniform(0.1, 0.7)
+    strongest = rng.uniform(0.1, 1.5) * STANDARD_G / (radius_m * (2 * np.pi * rate_hz) ** 2)
+    swing = min(np.exp(rng.uniform(np.log(0.1), np.log(1.4))), strongest)
+    second = rng.uniform(0.0, 0.3)
+    shape = np.sin(phase) + second * np.sin(2 * phase + rng.uniform(0.0, 2 * np.pi))
+    other = rng.uniform(0.0, 0.7) * np.sin(phase + rng.uniform(0.0, 2 * np.pi))
+    first, across = swing * size * shape + rng.uniform(-1.0, 1.0), swing * size * other
+    up = np.stack([np.sin(first) * np.cos(across), np.sin(across), np.cos(first) * np.cos(across)], axis=1)
+    moved = -radius_m * np.gradient(np.gradient(up, 1.0 / GRID_HZ, axis=0), 1.0 / GRID_HZ, axis=0) / STANDARD_G
+    felt = moved @ rotation(rng) + [0.0, 0.0, 1.0]
+    cos, sin = np.cos(first), np.sin(first)
+    x, y, z = felt.T
+    turned = np.stack([x * cos - z * sin, y, z * cos + x * sin], axis=1)
+    c, s = np.cos(across), np.sin(across)
+    x, y, z = turned.T
+    tremor = rng.uniform(0.0, 0.03) * rng.standard_normal((n, 3))
+    return np.stack([x, y * c - z * s, z * c + y * s], axis=1) + tremor
+
+
 def as_sensed(acc_g: Floats, rng: Rng) -> Floats:
     """Return it as another sensor would have given it: gain, offset, noise, rate, bits, range, frozen stretches."""
     out = acc_g * (1.0 + 0.08 * rng.standard_normal()) if rng.random() < 0.5 else acc_g
