@@ -321,7 +321,8 @@ class ParameterModel(BaseModel):
     high: float | None = Field(description="Largest value, inclusive")
     options: list[str] | None = Field(description="The words it takes")
     presets: dict[str, float | str] = Field(
-        description="Its value in each preset; the two are the same for steplink, which has no paper", examples=[{"paper": 1.0, "tuned": 5.75}]
+        description="Its value in each preset; steplink has no paper, and both are the same",
+        examples=[{"paper": 1.0, "tuned": 5.75}],
     )
 
 
