@@ -1,4 +1,4 @@
-"""steplink's own counter: what it says of synthetic walks and of other motion, and that its bits depend on nothing else."""
+"""steplink's own counter: what it says of walks and of other motion, and that its bits depend on nothing else."""
 
 from __future__ import annotations
 
