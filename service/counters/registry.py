@@ -19,6 +19,7 @@ from service.counters import (
     gyro_zero_crossing,
     plus_minus,
     steplink,
+    steplink_fast,
 )
 from service.counters.contract import StepCounter, lacking, with_overrides
 from service.counters.learning import MIDDLE, SLOWEST_WALK, WALK, Method
@@ -37,7 +38,10 @@ GYROSCOPE: Final = frozenset({Sensor.GYROSCOPE})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CounterKind:
-    """One algorithm: `presets` holds its parameter sets `paper` and `tuned`, `build` makes a counter of one."""
+    """One algorithm: `presets` holds its parameter sets `paper` and `tuned`, `build` makes a counter of one.
+
+    Both names are known for every counter, since tools ask for either of all; ours has no paper, and both are the same.
+    """
 
     name: str
     params: type
@@ -46,6 +50,8 @@ class CounterKind:
     build: Callable[[Any], StepCounter]
     calibrations: Mapping[str, Method]
     """Ways to learn some of its parameters from a walk, by name."""
+    compile_live: Callable[[], object] | None = None
+    """Compiles what a live session is quicker with, for seconds; those that run go on with it, and count the same."""
 
     def calibration(self, name: str) -> Method:
         """Return the method of that name; CounterError lists those it has."""
@@ -63,6 +69,7 @@ def _kind(
     tuned: object,
     sensors: frozenset[Sensor],
     calibrations: tuple[Method, ...] = (),
+    compile_live: Callable[[], object] | None = None,
 ) -> CounterKind:
     return CounterKind(
         name=name,
@@ -71,11 +78,19 @@ def _kind(
         sensors=sensors,
         build=build,
         calibrations=MappingProxyType({method.name: method for method in calibrations}),
+        compile_live=compile_live,
     )
 
 
 _KINDS: Final = (
-    _kind("steplink", steplink.build, paper=steplink.TUNED, tuned=steplink.TUNED, sensors=ACCELEROMETER),
+    _kind(
+        "steplink",
+        steplink.build,
+        paper=steplink.TUNED,
+        tuned=steplink.TUNED,
+        sensors=ACCELEROMETER,
+        compile_live=steplink_fast.compile_live,
+    ),
     _kind(
         "double_threshold",
         double_threshold.build,

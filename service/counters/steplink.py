@@ -16,15 +16,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from service.counters import steplink_ahead as ahead
 from service.counters import steplink_bouts as bouts
+from service.counters import steplink_fast as fast
 from service.counters import steplink_front as front
 from service.counters import steplink_network as network
-from service.counters import steplink_rhythm as rhythm
 from service.counters import steplink_weights
 from service.counters.contract import Snapshot, check_snapshot, ordered, parameter, params_hash
+from service.counters.steplink_frames import Frames
 from service.counters.streaming import COMPILED_FROM
 from service.samples import GRID_HZ, Column, Columns, Gait, Likely, SampleBlock, Sensor, Step, Update, Verdict
-from service.signals.compiled import compiled
+from service.signals.compiled import Kernel
 
 NAME: Final = "steplink"
 VERSION: Final = 1
@@ -35,8 +37,8 @@ FILTER_DELAY: Final = 2
 STILL_G: Final = 0.05
 """A frame whose magnitude ranges less is rest."""
 
-FRAMES_AT_ONCE: Final = 4096
-"""Of a whole recording: the network's values stay in the cache."""
+_Said = tuple[list[float], list[float], Sequence[Likely], Gait | None]
+"""Of some samples: the filtered signal, rows of steps, likely ones, gait."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,14 +82,13 @@ class SteplinkCounter:
     def __init__(self, params: SteplinkParams = TUNED, weights: network.Weights | None = None) -> None:
         self.params = params
         self.latency_s = latency_s(params)
-        self._weights = steplink_weights.in_use() if weights is None else weights
-        self._built = _Built(params=params, weights=steplink_weights.digest(self._weights))
+        used = steplink_weights.in_use() if weights is None else weights
+        self._built = _Built(params=params, weights=steplink_weights.digest(used))
         self._front = front.fresh()
         self._bouts = _fresh_bouts(params)
-        self._past = network.fresh_past()
-        self._rows: list[float] = []
-        """Rows of the frame that is not complete."""
-        self._rhythm = np.zeros((rhythm.COLUMNS, rhythm.WINDOW - network.FRAME_ROWS))
+        self._frames = Frames(used, self._bouts[bouts.LOW])
+        self._arrays: fast.Arrays | None = None
+        """While there are some they hold the state, and `_front`, `_bouts` and the frame's rows are old."""
         self._trace = [0.0] * 16
         self._made = [0.0] * (8 * front.ROW)
 
@@ -95,16 +96,17 @@ class SteplinkCounter:
         """Count on over `block`; ValueError where it overlaps."""
         n = len(block)
         if n == 0:
-            pending, likely = self._likely()
-            return Update(pending=pending, likely=likely, gait=self._gait())
-        rows = [] if block.start == self._bouts[bouts.NEXT] else self._open(block)
-        if n > COMPILED_FROM:
-            trace, found = self._scan_arrays(block.acc_g, n)
-        else:
-            trace, found = self._scan_lists(block.acc_g, n)
+            self._settle()
+            likely = self._likely()
+            return Update(pending=len(likely), likely=likely, gait=self._gait())
+        state = self._bouts if self._arrays is None else self._arrays.bouts
+        rows = [] if block.start == state[bouts.NEXT] else self._open(block)
+        kernel = fast.kernel() if n > COMPILED_FROM else fast.ready()
+        trace, found, likely, gait = (
+            self._scan(block.acc_g, n) if kernel is None else self._feed(kernel, block.acc_g, n)
+        )
         steps = _steps(rows + found) if rows or found else ()
-        pending, likely = self._likely()
-        return Update(steps, pending, likely, (block.start - FILTER_DELAY) / GRID_HZ, trace, (), self._gait())
+        return Update(steps, len(likely), likely, (block.start - FILTER_DELAY) / GRID_HZ, trace, (), gait)
 
     def finish(self) -> Update:
         """End the stream: what waits is decided with what is there."""
@@ -115,34 +117,30 @@ class SteplinkCounter:
 
     def snapshot(self) -> Snapshot:
         """Return the whole state as plain data."""
+        self._settle()
         state = {
             "front": self._front[front.CONSTANTS :],
             "bouts": self._bouts[bouts.CONSTANTS :],
-            "past": [past.ravel().tolist() for past in self._past],
-            "rows": list(self._rows),
-            "rhythm": self._rhythm.ravel().tolist(),
+            **self._frames.snapshot(),
         }
         return {"counter": self.name, "version": self.version, "params": params_hash(self._built), "state": state}
 
     def restore(self, state: Snapshot) -> None:
         """Take over a snapshot's state; SnapshotError where it is another counter's."""
         check_snapshot(state, name=self.name, version=self.version, params=self._built)
+        self._settle()
         kept = state["state"]
         self._front[front.CONSTANTS :] = map(float, kept["front"])
         self._bouts[bouts.CONSTANTS :] = map(float, kept["bouts"])
-        self._past = [
-            np.array(values, np.float32).reshape(past.shape)
-            for values, past in zip(kept["past"], network.fresh_past(), strict=True)
-        ]
-        self._rows = list(map(float, kept["rows"]))
-        self._rhythm = np.array(kept["rhythm"]).reshape(rhythm.COLUMNS, -1)
+        self._frames.restore(kept)
 
     def count(self, block: SampleBlock) -> NDArray[np.float64]:
         """Count a whole recording from a fresh state without making a Step of each; rows as in `steplink_bouts`."""
         if len(block) == 0:
             return np.empty((0, bouts.ROW))
         self._open(block)
-        _, found = self._scan_arrays(block.acc_g, len(block))
+        kernel, n = fast.kernel(), len(block)
+        _, found, _, _ = self._scan(block.acc_g, n) if kernel is None else self._feed(kernel, block.acc_g, n)
         rows = found + self._close()
         bouts.end(self._bouts)
         self._bouts[bouts.NEXT] = -1.0
@@ -154,19 +152,19 @@ class SteplinkCounter:
 
     def _open(self, block: SampleBlock) -> list[float]:
         """Begin a stretch; return the rows of the one that ended."""
+        self._settle()
         awaited = self._bouts[bouts.NEXT]
         if block.start < awaited:
             raise ValueError(f"block starts at {block.start}, {int(awaited)} was next")
         rows = self._close()
         front.begin(self._front, *(float(column[0]) for column in block.acc_g))
         bouts.begin(self._bouts, float(block.start))
-        self._past = network.fresh_past()
-        self._rows = []
-        self._rhythm = np.zeros_like(self._rhythm)
+        self._frames.begin()
         return rows
 
     def _close(self) -> list[float]:
         """End the stretch: the network is told that all is still, and what it had not judged is judged."""
+        self._settle()
         s = self._bouts
         if s[bouts.NEXT] < 0.0:
             return []
@@ -174,9 +172,9 @@ class SteplinkCounter:
         at = max(first, seen - (seen - first) % bouts.FRAME - network.DELAY * bouts.FRAME)
         left = -(-(seen - first) // bouts.FRAME) * bouts.FRAME
         still = left // front.EVERY - (seen - first) // front.EVERY + network.DELAY * network.FRAME_ROWS
-        z, c = self._answers(np.zeros(still * front.ROW))
+        z, c = self._frames.answers([0.0] * (still * front.ROW))
         skip = len(z) - -(-(seen - at) // bouts.FRAME)
-        out = [0.0] * _room(seen - at, s)
+        out = [0.0] * bouts.room(seen - at, s[bouts.WAIT])
         end = 0
         for number in range(skip, len(z)):
             n = min(bouts.FRAME, seen - at)
@@ -184,76 +182,59 @@ class SteplinkCounter:
             at += n
         return out[:end]
 
-    def _scan_lists(self, columns: Columns, n: int) -> tuple[list[float], list[float]]:
+    def _scan(self, columns: Columns, n: int) -> _Said:
+        """Take n samples plainly."""
+        self._settle()
         if n > len(self._trace):
             self._trace, self._made = [0.0] * n, [0.0] * ((n // front.EVERY + 1) * front.ROW)
         x, y, z = map(_as_list, columns)
         made = front.scan(x, y, z, n, self._front, self._trace, self._made)
-        answers = self._answers(self._made[: made * front.ROW])
-        out = [0.0] * _room(n, self._bouts)
+        answers = self._frames.answers(self._made[: made * front.ROW])
+        out = [0.0] * bouts.room(n, self._bouts[bouts.WAIT])
         end = bouts.advance(self._bouts, self._trace, n, *answers, out)
-        return self._trace[:n], out[:end]
+        return self._trace[:n], out[:end], self._likely(), self._gait()
 
-    def _scan_arrays(self, columns: Columns, n: int) -> tuple[list[float], list[float]]:
-        x, y, z = (np.ascontiguousarray(column, dtype=np.float64) for column in columns)
-        trace, made = np.empty(n), np.empty((n // front.EVERY + 1) * front.ROW)
-        state = np.array(self._front)
-        count = compiled(front.scan)(x, y, z, n, state, trace, made)
-        self._front = state.tolist()
-        state, out = np.array(self._bouts), np.empty(_room(n, self._bouts))
-        answers = [np.asarray(values) for values in self._answers(made[: count * front.ROW])]
-        end = compiled(bouts.advance)(state, trace, n, *answers, out)
-        self._bouts = state.tolist()
-        return trace.tolist(), out[:end].tolist()
+    def _feed(self, kernel: Kernel, columns: Columns, n: int) -> _Said:
+        """Take n samples with the compiled kernel."""
+        if self._arrays is None:
+            self._arrays = fast.Arrays(self._front, self._bouts, self._frames)
+        trace, found, likely, told = self._arrays.feed(kernel, columns, n)
+        return (
+            trace,
+            found,
+            [_likely(*likely[i : i + ahead.ROW]) for i in range(0, len(likely), ahead.ROW)],
+            _gait(*told),
+        )
 
-    def _answers(self, made: Sequence[float] | NDArray[np.float64]) -> tuple[Sequence[float], Sequence[float]]:
-        """Take rows of the front end; return logit and cadence for each frame that they complete."""
-        frame = network.FRAME_ROWS * front.ROW
-        if len(self._rows) + len(made) < frame:
-            self._rows += list(made)
-            return (), ()
-        rows = np.concatenate((np.array(self._rows), made))
-        frames = len(rows) // frame
-        self._rows = rows[frames * frame :].tolist()
-        rows = rows[: frames * frame].reshape(-1, front.ROW)
-        if frames <= FRAMES_AT_ONCE:
-            return self._judge(rows)
-        size = FRAMES_AT_ONCE * network.FRAME_ROWS
-        parts = [self._judge(rows[first : first + size]) for first in range(0, len(rows), size)]
-        return [z for part, _ in parts for z in part], [c for _, part in parts for c in part]
+    def _settle(self) -> None:
+        """Have the state in lists."""
+        if self._arrays is not None:
+            self._front, self._bouts, self._frames.rows = self._arrays.lists()
+            self._arrays = None
 
-    def _judge(self, rows: NDArray[np.float64]) -> tuple[list[float], list[float]]:
-        """Return logit and cadence for whole frames of rows."""
-        sensed = rows[:, : front.SENSED].astype(np.float32).reshape(-1, network.FRAME_ROWS, front.SENSED)
-        logits = network.run(self._weights, sensed, self._past).tolist()
-        walking = [z * rhythm.LOGIT for z, _ in logits]
-        pace = [rhythm.cadence_hz(z) for _, z in logits]
-        seen = np.concatenate((self._rhythm, rows[:, front.SENSED :].T), axis=1)
-        self._rhythm = seen[:, network.FRAME_ROWS * len(logits) :]
-        perhaps = [i for i, z in enumerate(walking) if z > self._bouts[bouts.LOW]]
-        if perhaps:
-            r = rhythm.correlations(rhythm.windows(seen)[perhaps])
-            for i, exact in zip(perhaps, rhythm.refined_hz(np.array([pace[i] for i in perhaps]), r), strict=True):
-                pace[i] = float(exact)
-        return walking, pace
-
-    def _likely(self) -> tuple[int, Sequence[Likely]]:
-        found = bouts.likely(self._bouts)
-        if not found:
-            return 0, ()
-        return len(found), [((at - FILTER_DELAY) / GRID_HZ, size, passes) for at, size, passes in found]
+    def _likely(self) -> Sequence[Likely]:
+        return [_likely(at, strength) for at, strength in ahead.likely(self._bouts)]
 
     def _gait(self) -> Gait | None:
         s = self._bouts
         if s[bouts.NEXT] < 0.0:
             return None
-        at_s = (s[bouts.DECIDED] - FILTER_DELAY) / GRID_HZ
-        confidence = 1.0 / (1.0 + exp(-s[bouts.Z]))
-        if s[bouts.WALKING] > 0.0:
-            return Gait(at_s, Verdict.WALKING, confidence, s[bouts.CADENCE])
-        if s[bouts.WAIT] > 0.0:
-            return Gait(at_s, Verdict.PERHAPS, confidence, None)
-        return Gait(at_s, Verdict.REST if s[bouts.MOVED] < STILL_G else Verdict.OTHER, confidence, None)
+        return _gait(*(s[at] for at in bouts.TOLD))
+
+
+def _likely(at: float, strength: float) -> Likely:
+    return (at - FILTER_DELAY) / GRID_HZ, strength, True
+
+
+def _gait(decided: float, z: float, moved: float, walking: float, cadence_hz: float, waiting: float) -> Gait:
+    """Return what the state says of walking; its arguments are `bouts.TOLD`."""
+    at_s = (decided - FILTER_DELAY) / GRID_HZ
+    confidence = 1.0 / (1.0 + exp(-z))
+    if walking > 0.0:
+        return Gait(at_s, Verdict.WALKING, confidence, cadence_hz)
+    if waiting > 0.0:
+        return Gait(at_s, Verdict.PERHAPS, confidence, None)
+    return Gait(at_s, Verdict.REST if moved < STILL_G else Verdict.OTHER, confidence, None)
 
 
 def build(params: SteplinkParams = TUNED) -> SteplinkCounter:
@@ -280,11 +261,6 @@ def _fresh_bouts(p: SteplinkParams) -> list[float]:
     s[bouts.NEXT] = -1.0
     bouts.end(s)
     return s
-
-
-def _room(n: int, s: Sequence[float]) -> int:
-    """Return how many floats the rows of n samples may take: four steps a second, and what waits."""
-    return bouts.ROW * int((n + (s[bouts.WAIT] + network.DELAY + 2) * bouts.FRAME) / 10 + 8)
 
 
 def _steps(rows: Sequence[float]) -> tuple[Step, ...]:

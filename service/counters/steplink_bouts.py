@@ -19,7 +19,8 @@ from typing import Final
 
 from service.counters.steplink_front import EVERY
 from service.counters.steplink_network import DELAY, FRAME_ROWS
-from service.samples import GRID_HZ, Likely
+from service.counters.steplink_rhythm import FASTEST_HZ
+from service.samples import GRID_HZ
 
 FRAME: Final = FRAME_ROWS * EVERY
 """Grid samples a frame."""
@@ -55,6 +56,8 @@ NEXT: Final = 19  # index of the sample to come; −1 before the first stretch a
 Z: Final = 20  # logit of the newest frame decided
 DECIDED: Final = 21  # index after the last sample of that frame
 MOVED: Final = 22  # how far the magnitude ranged in it, g
+TOLD: Final = (DECIDED, Z, MOVED, WALKING, CADENCE, WAIT)
+"""What is told of walking after every packet."""
 HELD: Final = 23
 """Frames that wait: index, samples, cadence, share."""
 HELD_ROW: Final = 4
@@ -73,8 +76,6 @@ NEAREST: Final = 0.4
 """Crests of two steps are at least this share of a step apart."""
 FOLLOW: Final = 0.25
 """How far the offset follows each crest."""
-CREST_SHARE: Final = 0.35
-"""A crest this high, beside those before it, is told before the network has judged it."""
 
 State = MutableSequence[float]
 Floats = Sequence[float]
@@ -96,6 +97,11 @@ def end(s: State) -> None:
     s[WALKING] = s[BELOW] = s[CADENCE] = s[PART] = s[SIZE_G] = 0.0
     s[LAST] = -1.0
     s[OFFSET] = 0.5
+
+
+def room(n: int, waiting: float) -> int:
+    """Return how many floats the rows of n samples may take, and of what was not judged or waits."""
+    return ROW * int((n + (waiting + DELAY + 2) * FRAME) * FASTEST_HZ / GRID_HZ + 2)
 
 
 def advance(s: State, trace: Floats, n: int, z: Floats, c: Floats, out: State) -> int:
@@ -247,47 +253,3 @@ def _range(s: State, from_: int, to: int) -> float:
         low = min(low, value)
         high = max(high, value)
     return high - low
-
-
-def likely(s: State) -> list[Likely]:
-    """Return the crests of a certain walk that the network has not judged yet, where the next steps are expected.
-
-    Runs once a packet, plain. The last crest may still grow, and is told once the magnitude falls from it.
-    """
-    found: list[Likely] = []
-    if s[WALKING] <= 0.0 or s[NEXT] < 0.0:
-        return found
-    period, seen, last, offset = GRID_HZ / s[CADENCE], int(s[NEXT]), int(s[LAST]), s[OFFSET]
-    due = s[DECIDED] + (1.0 - s[PART]) * period
-    base = max(int(s[FIRST]), last, seen - LENGTH + 1, 0)
-    recent = _recent(s, base, seen)
-    least = CREST_SHARE * s[SIZE_G]
-    while due < seen:
-        at = _crest_in(recent, base, due, period, offset, last)
-        if at >= seen:
-            break
-        low = min(recent[max(last, at - int(period), base) - base : at - base + 1])
-        height = recent[at - base]
-        if height - low >= least and height - min(recent[at - base :]) >= least:
-            found.append((float(at), height - low, True))
-            last = at
-            offset += FOLLOW * ((at - due) / period - offset)
-            offset -= floor(offset)
-        due += period
-    return found
-
-
-def _recent(s: State, from_: int, to: int) -> Sequence[float]:
-    """Return the magnitudes from index `from_` up to `to`."""
-    a, b = RING + from_ % LENGTH, RING + to % LENGTH
-    return s[a:b] if a < b else [*s[a : RING + LENGTH], *s[RING:b]]
-
-
-def _crest_in(recent: Sequence[float], base: int, due: float, period: float, offset: float, last: int) -> int:
-    """Return the same as `_crest`, of magnitudes that begin at index `base`."""
-    centre = due + offset * period
-    from_ = max(ceil(max(due, centre - 0.5 * period)), base + 2)
-    if last >= 0:
-        from_ = max(from_, last + 1 + int(NEAREST * period))
-    part = recent[from_ - base : int(centre + 0.5 * period) + 1 - base]
-    return from_ + part.index(max(part)) if part else base + len(recent)

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import MutableSequence, Sequence
 from functools import cache
-from math import floor, log, sqrt
+from math import floor, log, sinh, sqrt
 from typing import Final
 
 from service.samples import GRID_HZ
@@ -39,6 +39,8 @@ EVERY: Final = 2
 UNIT: Final = 256.0
 """Of the integers, a unit of s; or a g, of those for the rhythm."""
 SENSED_LIMIT: Final = 1023.0
+SENSED_MOST: Final = sinh(2.0 * SENSED_LIMIT / UNIT)
+"""8 u from which s(u) is the limit."""
 RHYTHM_LIMIT: Final = 4095.0
 
 LARGEST_G2: Final = 10_000.0
@@ -171,10 +173,13 @@ def squashed(u: float) -> float:
     """Return s(u) as an integer number of 1/UNIT."""
     w = 8.0 * u
     size = w if w > 0.0 else -w
-    value = min(floor(0.5 * UNIT * log(size + sqrt(size * size + 1.0)) + 0.5), SENSED_LIMIT)
+    value = floor(0.5 * UNIT * log(size + sqrt(size * size + 1.0)) + 0.5) if size < SENSED_MOST else SENSED_LIMIT
     return value if w > 0.0 else -value
 
 
 def counted(u: float) -> float:
     """Return u as an integer number of 1/UNIT."""
-    return max(min(floor(UNIT * u + 0.5), RHYTHM_LIMIT), -RHYTHM_LIMIT)
+    value = floor(UNIT * u + 0.5)
+    if -RHYTHM_LIMIT <= value <= RHYTHM_LIMIT:
+        return value
+    return RHYTHM_LIMIT if value > 0.0 else -RHYTHM_LIMIT

@@ -21,9 +21,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from service.counters import steplink_front as front
@@ -42,9 +44,9 @@ BIAS_LIMIT: Final = 1_000_000.0
 
 Values = NDArray[np.float32]
 
-_NONE: Final = np.float32(0.0)
-_MOST: Final = np.float32(LIMIT)
-_POOLED: Final = np.float32(POOLED)
+_NONE: Final = np.array(0.0, np.float32)
+_MOST: Final = np.array(LIMIT, np.float32)
+_POOLED: Final = np.array(POOLED, np.float32)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,29 +84,41 @@ LAST: Final = Layer(inputs=FRAMED, outputs=2, taps=1, every=1)
 LAYERS: Final = (FIRST, *FAST, *SLOW, LAST)
 
 
+FRAMED_FROM: Final = 1 + len(FAST)
+"""The first layer that sees frames."""
+
+
+PLACES: Final = (0, *accumulate((layer.taps * layer.inputs + 1) * layer.outputs for layer in LAYERS))
+"""Where the weights of each layer begin, and where the last one's end."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Weights:
-    """Weights of every layer, (taps × inputs) × outputs, oldest tap first, and its biases.
+    """Weights of every layer, (taps × inputs) × outputs, oldest tap first, then its biases; layer after layer.
 
     Integers, divided by the power of two that makes integers of 1/UNIT of what a layer gives: as exact as they were.
     """
 
-    kernels: Sequence[Values]
-    biases: Sequence[Values]
+    flat: Values
+
+    def kernels(self) -> list[Values]:
+        """Return the weights of each layer, the biases as a last row."""
+        return [
+            self.flat[first:last].reshape(-1, layer.outputs)
+            for layer, first, last in zip(LAYERS, PLACES, PLACES[1:], strict=False)
+        ]
 
 
 def weights_of(arrays: Mapping[str, NDArray[np.generic]]) -> Weights:
     """Return the weights of an archive with `kernel0` … and `bias0` …; ValueError where a shape is not the layer's."""
-    kernels, biases = [], []
+    kernels = []
     for i, layer in enumerate(LAYERS):
         kernel, bias = np.asarray(arrays[f"kernel{i}"]), np.asarray(arrays[f"bias{i}"])
         wanted = (layer.taps * layer.inputs, layer.outputs)
         if kernel.shape != wanted or bias.shape != wanted[1:]:
             raise ValueError(f"layer {i} is {kernel.shape}, {wanted} is wanted")
-        unit = np.float32(scale(i))
-        kernels.append(np.ascontiguousarray(kernel, dtype=np.float32) * unit)
-        biases.append(np.ascontiguousarray(bias, dtype=np.float32) * unit)
-    return Weights(kernels, biases)
+        kernels.append(np.vstack((kernel, bias)).astype(np.float32).ravel() * np.float32(scale(i)))
+    return Weights(np.concatenate(kernels))
 
 
 def scale(i: int) -> float:
@@ -114,37 +128,128 @@ def scale(i: int) -> float:
     return UNIT / (front.UNIT * WEIGHT_UNIT) if i == 0 else 1.0 / WEIGHT_UNIT
 
 
-def fresh_past() -> list[Values]:
-    """Return what each layer but the last remembers before the first frame: nothing."""
-    return [np.zeros((layer.reach, layer.inputs), np.float32) for layer in LAYERS[:-1]]
+def values_a_frame(i: int) -> int:
+    """Return how many values of each of its inputs layer i sees in a frame."""
+    if i >= FRAMED_FROM:
+        return 1
+    return FRAME_ROWS if i == 0 else POOLED
 
 
-def run(weights: Weights, rows: Values, past: list[Values]) -> Values:
-    """Return frames × 2 logits of 1/(UNIT × WEIGHT_UNIT) for frames × FRAME_ROWS × SENSED integers; `past` goes on."""
-    frames = len(rows)
-    x = _layer(weights, 0, rows.reshape(frames * FRAME_ROWS, front.SENSED), past)
-    x = np.maximum(x[0::2], x[1::2])
-    for i in range(1, 1 + len(FAST)):
-        x = _layer(weights, i, x, past)
-    x = x.reshape(frames, POOLED, WIDE)
-    x = np.concatenate((np.rint(x.sum(axis=1) / _POOLED), x.max(axis=1)), axis=1)
-    for i in range(1 + len(FAST), len(LAYERS) - 1):
-        x = _layer(weights, i, x, past)
-    z: Values = x @ weights.kernels[-1] + weights.biases[-1]
-    return z
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stage:
+    """Where a layer computes: views of one memory, made once, so that a frame takes few calls and makes nothing."""
+
+    layer: Layer
+    kernel: Values
+    new: Values
+    """What goes in: as many values as the frames have, × inputs; those before lie before it in memory."""
+    seen: Values
+    """What each value looks at: × taps × inputs."""
+    taps: Values
+    """The same, side by side in `columns`, which end with a 1 for the bias."""
+    columns: Values
+    sums: Values
 
 
-def _layer(weights: Weights, i: int, x: Values, past: list[Values]) -> Values:
-    layer = LAYERS[i]
-    whole = np.concatenate((past[i], x))
-    n = len(x)
-    seen = [whole[tap * layer.every : tap * layer.every + n] for tap in range(layer.taps)]
-    past[i] = whole[n:]
-    y: Values = np.concatenate(seen, axis=1) @ weights.kernels[i]
-    y += weights.biases[i]
+class Stream:
+    """The network along one stream, `frames` at a time, and what each layer remembers of those before."""
+
+    def __init__(self, weights: Weights, frames: int = 1) -> None:
+        self.weights, self._frames = weights, frames
+        places = layout(frames)
+        self.memory = np.zeros(places[-1], weights.flat.dtype)
+        """What goes into each layer, after what went in before; see `layout`."""
+        self._stages = [
+            _stage(i, kernel, self.memory[places[i] : places[i + 1]], frames)
+            for i, kernel in enumerate(weights.kernels())
+        ]
+        self._past = _kept(places[:-1])
+        self._moved, self.moves = np.empty_like(self.memory), np.arange(places[-1])
+        """What each place of memory holds after a frame: itself, or what has become past."""
+        self.moves[self._past] = _kept(
+            [end - layer.reach * layer.inputs for end, layer in zip(places[1:], LAYERS, strict=True)]
+        )
+
+    @property
+    def past(self) -> Values:
+        """What each layer remembers, one after the other, oldest value first."""
+        return self.memory[self._past]
+
+    @past.setter
+    def past(self, values: Values) -> None:
+        self.memory[self._past] = values
+
+    def run(self, rows: NDArray[np.float64]) -> Values:
+        """Return frames × 2 logits of 1/(UNIT × WEIGHT_UNIT) for (frames × FRAME_ROWS) × SENSED integers."""
+        if len(rows) == self._frames * FRAME_ROWS:
+            return self._run(rows)
+        other = Stream(self.weights, len(rows) // FRAME_ROWS)
+        other.past = self.past
+        logits = other._run(rows)
+        self.past = other.past
+        return logits
+
+    def _run(self, rows: NDArray[np.float64]) -> Values:
+        stages = self._stages
+        stages[0].new[...] = rows
+        given = _layer(stages[0])
+        np.maximum(given[0::2], given[1::2], out=stages[1].new)
+        for i in range(1, FRAMED_FROM - 1):
+            _layer(stages[i], stages[i + 1].new)
+        given = _layer(stages[FRAMED_FROM - 1]).reshape(-1, POOLED, WIDE)
+        mean, most = stages[FRAMED_FROM].new[:, :WIDE], stages[FRAMED_FROM].new[:, WIDE:]
+        np.divide(np.add.reduce(given, 1), _POOLED, out=mean)
+        np.rint(mean, out=mean)
+        np.maximum.reduce(given, 1, out=most)
+        for i in range(FRAMED_FROM, len(LAYERS) - 1):
+            _layer(stages[i], stages[i + 1].new)
+        self.memory.take(self.moves, None, self._moved, "clip")
+        self.memory[...] = self._moved
+        return _sums(stages[-1]).copy()
+
+
+def layout(frames: int) -> list[int]:
+    """Return where each layer's values begin in a Stream's memory, and where the last one's end."""
+    sizes = [(layer.reach + frames * values_a_frame(i)) * layer.inputs for i, layer in enumerate(LAYERS)]
+    return [0, *accumulate(sizes)]
+
+
+def _kept(firsts: Sequence[int]) -> NDArray[np.intp]:
+    """Return where as many values stand as each layer remembers, `firsts` being the first of each."""
+    return np.concatenate(
+        [np.arange(first, first + layer.reach * layer.inputs) for first, layer in zip(firsts, LAYERS, strict=True)]
+    )
+
+
+NOTHING: Final = np.zeros(sum(layer.reach * layer.inputs for layer in LAYERS), np.float32)
+"""What a stream remembers before its first frame."""
+
+
+def _stage(i: int, kernel: Values, memory: Values, frames: int) -> _Stage:
+    layer, n = LAYERS[i], frames * values_a_frame(i)
+    columns, item = np.ones((n, len(kernel)), kernel.dtype), memory.itemsize
+    shape, value = (n, layer.taps, layer.inputs), layer.inputs * item
+    return _Stage(
+        layer=layer,
+        kernel=kernel,
+        new=memory.reshape(-1, layer.inputs)[layer.reach :],
+        seen=as_strided(memory, shape, (value, layer.every * value, item)),
+        taps=as_strided(columns, shape, (columns.strides[0], value, item)),
+        columns=columns,
+        sums=np.empty((n, layer.outputs), kernel.dtype),
+    )
+
+
+def _layer(stage: _Stage, given: Values | None = None) -> Values:
+    """Write what a layer gives to `given`."""
+    y = _sums(stage)
     np.rint(y, out=y)
     np.maximum(y, _NONE, out=y)
-    if layer.adds:
-        y += x
-    np.minimum(y, _MOST, out=y)
-    return y
+    if stage.layer.adds:
+        np.add(y, stage.new, out=y)
+    return np.minimum(y, _MOST, out=y if given is None else given)
+
+
+def _sums(stage: _Stage) -> Values:
+    stage.taps[...] = stage.seen
+    return stage.columns.dot(stage.kernel, stage.sums)

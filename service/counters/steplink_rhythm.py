@@ -10,10 +10,12 @@ The rows are integers, so each sum of products is exact and its bits are the sam
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import exp
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from service.counters import steplink_front as front
@@ -32,18 +34,19 @@ SPAN_HZ: Final = 3.2
 LOGIT: Final = 1.0 / (UNIT * WEIGHT_UNIT)
 
 FACTORS: Final = 0.6 * (1.5 / 0.6) ** (np.arange(61) / 60.0)
+_FACTORS: Final[list[float]] = FACTORS.tolist()
+FASTEST_HZ: Final = (SLOWEST_HZ + SPAN_HZ) * _FACTORS[-1]
 COSTS: Final = 2.0 * np.log(FACTORS) ** 2
 ACCEPTED: Final = 0.35
 
 Floats = NDArray[np.float64]
 
-TRANSFORM: Final = 256
-"""Values of the Fourier transform: more than WINDOW + LAGS, so that nothing wraps around."""
-
-_PERIODS: Final = np.concatenate((1.0 / FACTORS, 2.0 / FACTORS, 2.0 / FACTORS))
+PERIODS: Final = np.concatenate((1.0 / FACTORS, 2.0 / FACTORS, 2.0 / FACTORS))
 """Lags of r_m(T), r_m(2T), r_t(2T), as shares of the rough period; and where each correlation begins."""
 _FIRST: Final = np.repeat((0, 0, LAGS), len(FACTORS))
-_UNBIASED: Final = WINDOW / (WINDOW - np.arange(LAGS, dtype=np.float64))
+UNBIASED: Final = WINDOW / (WINDOW - np.arange(LAGS, dtype=np.float64))
+_APART: Final = WINDOW + LAGS - 1
+"""From one column to the next, the rest being 0: no lag reaches from one into another."""
 
 
 def cadence_hz(z: float) -> float:
@@ -51,40 +54,74 @@ def cadence_hz(z: float) -> float:
     return SLOWEST_HZ + SPAN_HZ / (1.0 + exp(0.5 - z * LOGIT))
 
 
-def windows(columns: Floats) -> Floats:
-    """Return frames × COLUMNS × WINDOW; `columns` begin WINDOW − FRAME_ROWS rows before the first frame does."""
-    frames = (columns.shape[1] - WINDOW) // FRAME_ROWS + 1
-    by_column, by_row = columns.strides
-    return np.lib.stride_tricks.as_strided(
-        columns, (frames, COLUMNS, WINDOW), (by_row * FRAME_ROWS, by_column, by_row), writeable=False
-    )
+NOTHING: Final = np.zeros((COLUMNS, WINDOW - FRAME_ROWS))
+"""What a window begins with before its first frame."""
+
+
+class Windows:
+    """The last WINDOW rows of a stream, kept from frame to frame."""
+
+    def __init__(self) -> None:
+        self.seen = np.zeros((1, COLUMNS, WINDOW))
+
+    @property
+    def past(self) -> Floats:
+        """COLUMNS × (WINDOW − FRAME_ROWS): what the next frame's window begins with."""
+        return self.seen[0, :, FRAME_ROWS:]
+
+    @past.setter
+    def past(self, columns: Floats) -> None:
+        self.seen[0, :, FRAME_ROWS:] = columns
+
+    def take(self, rows: Floats) -> Floats:
+        """Return frames × COLUMNS × WINDOW for (frames × FRAME_ROWS) × COLUMNS, to be read before more is taken."""
+        if len(rows) == FRAME_ROWS:
+            self.seen[0, :, :-FRAME_ROWS] = self.seen[0, :, FRAME_ROWS:]
+            self.seen[0, :, -FRAME_ROWS:] = rows.T
+            return self.seen
+        columns = np.concatenate((self.past, rows.T), axis=1)
+        self.past = columns[:, len(rows) :]
+        by_column, by_row = columns.strides
+        shape = (len(rows) // FRAME_ROWS, COLUMNS, WINDOW)
+        return as_strided(columns, shape, (by_row * FRAME_ROWS, by_column, by_row), writeable=False)
 
 
 def correlations(seen: Floats) -> Floats:
     """Return frames × 2 × LAGS of r_m and r_t for frames × COLUMNS × WINDOW integers."""
-    level = seen - np.rint(seen.sum(axis=2) / WINDOW)[:, :, None]
-    spectrum = np.fft.rfft(level, TRANSFORM)
-    power = spectrum.real * spectrum.real + spectrum.imag * spectrum.imag
-    power[:, 1] += power[:, 2]
-    power[:, 1] += power[:, 3]
-    sums = np.rint(np.fft.irfft(power[:, :2], TRANSFORM)[:, :, :LAGS])
-    ratio: Floats = sums / np.maximum(sums[:, :, :1], 1.0)
-    ratio *= _UNBIASED
-    return ratio
+    apart = np.zeros((len(seen), COLUMNS, _APART))
+    level = np.add.reduce(seen, 2)
+    level /= WINDOW
+    np.rint(level, out=level)
+    np.subtract(seen, level[:, :, None], out=apart[:, :, :WINDOW])
+    r = np.empty((len(seen), 2, LAGS))
+    for columns, (of_magnitude, of_axes) in zip(apart.reshape(len(seen), -1), r, strict=True):
+        of_magnitude[:] = np.correlate(columns[:_APART], columns[:WINDOW], "valid")
+        of_axes[:] = np.correlate(columns[_APART:], columns[_APART : WINDOW - _APART], "valid")
+    r /= np.maximum(r[:, :, :1], 1.0)
+    r *= UNBIASED
+    return r
 
 
-def refined_hz(rough_hz: Floats, r: Floats) -> Floats:
-    """Return the cadence that `correlations` have near each frame's `rough_hz`; that itself where they have none."""
-    lags = (ROWS_HZ / rough_hz)[:, None] * _PERIODS
-    whole = np.minimum(lags, LAGS - 2.0).astype(np.intp)
-    at = whole + _FIRST
+def refined_hz(rough_hz: Sequence[float], r: Floats) -> list[float]:
+    """Return the cadence that `correlations` have near each frame's `rough_hz`; that itself where they have none.
+
+    `r` is spent by it.
+    """
+    lags = (ROWS_HZ / np.array(rough_hz))[:, None] * PERIODS
+    whole = np.minimum(lags.astype(np.intp), LAGS - 1)
+    lags -= whole
+    whole += _FIRST
     if len(r) > 1:
-        at += 2 * LAGS * np.arange(len(r))[:, None]
-    flat = r.ravel()
-    before = flat[at]
-    values = before + (flat[at + 1] - before) * (lags - whole)
-    values[lags >= LAGS - 1] = 0.0
-    s = values.reshape(-1, 3, len(FACTORS)).sum(axis=1) / 3.0
-    best = (s - COSTS).argmax(axis=1)
-    accepted = (best > 0) & (best < len(FACTORS) - 1) & (s[np.arange(len(s)), best] > ACCEPTED)
-    return np.where(accepted, rough_hz * FACTORS[best], rough_hz)
+        whole += 2 * LAGS * np.arange(len(r))[:, None]
+    rise = np.zeros_like(r)
+    np.subtract(r[:, :, 1:], r[:, :, :-1], out=rise[:, :, :-1])
+    r[:, :, -1] = 0.0
+    lags *= rise.take(whole)
+    lags += r.take(whole)
+    s = np.add.reduce(lags.reshape(-1, 3, len(FACTORS)), 1)
+    s /= 3.0
+    best = (s - COSTS).argmax(axis=1).tolist()
+    return [
+        rough * _FACTORS[k] if 0 < k < len(FACTORS) - 1 and s[i, k] > ACCEPTED else rough
+        for i, (rough, k) in enumerate(zip(rough_hz, best, strict=True))
+    ]

@@ -133,6 +133,7 @@ def packed(arrays: Mapping[str, NDArray[np.integer[Any]]], about: Mapping[str, A
     return content.getvalue()
 
 
+@cache
 def digest(weights: network.Weights) -> str:
     """Return what tells these weights from others, in 12 letters."""
     hashed = hashlib.sha256()
@@ -144,9 +145,9 @@ def digest(weights: network.Weights) -> str:
 def integers(weights: network.Weights) -> dict[str, NDArray[np.int32]]:
     """Return the arrays that `packed` takes."""
     out: dict[str, NDArray[np.int32]] = {}
-    for i, (kernel, bias) in enumerate(zip(weights.kernels, weights.biases, strict=True)):
-        unit = np.float32(network.scale(i))
-        out[f"kernel{i}"], out[f"bias{i}"] = (kernel / unit).astype(np.int32), (bias / unit).astype(np.int32)
+    for i, kernel in enumerate(weights.kernels()):
+        whole = (kernel / np.float32(network.scale(i))).astype(np.int32)
+        out[f"kernel{i}"], out[f"bias{i}"] = whole[:-1], whole[-1]
     return out
 
 

@@ -2,10 +2,11 @@
 
 All on one core, the best of RUNS (live, of LIVE_RUNS for each stretch of packets), numba's compilation excluded, 50 Hz
 columns of float64 in memory. The signal is a synthetic walk. `offline` counts all of it at once, `fast` with numba and
-`plain` without; `live` counts packets of ten samples. The yardsticks are `find_peaks`, what a textbook does with scipy,
-and `minimal loop`, the same job as one loop of numba that keeps nothing but the number. Chen 2015 prints what its three
-counters took for 5,000 samples, in MATLAB at 2.27 GHz. `with reading and resampling` reads a recording of all sensors
-at 100 Hz and puts it on the grid first; beside that the counters hardly differ.
+`plain` without; `live` counts packets of ten samples, plain as a lone session is, and `a hundred sessions` by turns,
+with numba where it is there, as a service with many devices does. The yardsticks are `find_peaks`, what a textbook does
+with scipy, and `minimal loop`, the same job as one loop of numba that keeps nothing but the number. Chen 2015 prints
+what its three counters took for 5,000 samples, in MATLAB at 2.27 GHz. `with reading and resampling` reads a recording
+of all sensors at 100 Hz and puts it on the grid first; beside that the counters hardly differ.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from service.counters import registry, steplink, steplink_weights
+from service.counters import registry, steplink, steplink_fast, steplink_weights
 from service.counters.contract import RecordingCounter, StepCounter
 from service.evaluation import yardsticks
 from service.evaluation.counting import grid_block, pieces, streamed
@@ -51,6 +52,12 @@ LIVE_RUNS: Final = 10
 STRETCH: Final = 100
 """Packets timed at once."""
 
+SESSIONS: Final = 100
+SESSION_PACKETS: Final = 240
+"""Packets of each of the sessions that are counted by turns: a round of them takes more than the caches hold."""
+ROUNDS: Final = 12
+"""After so many packets of ten samples a counter does the same again: five frames of 24."""
+
 PAPER_SAMPLES: Final = 5000
 PAPER_S: Final = {"adaptive_peak": 0.036, "conventional_peak": 0.046, "autocorrelation": 0.131}
 
@@ -80,6 +87,7 @@ def figures(counters: Sequence[str], samples: int = SAMPLES) -> Iterator[Figure]
             yield _paper(name, block)
         if name == steplink.NAME:
             yield Figure(name="model load", value=1e3 * best_s(steplink_weights.unpacked), unit="ms")
+            yield _sessions(name, block)
     yield _live_packets()
     if available():
         yield from _from_file(counters, yardsticks.head(block, samples // FILE_SHARE))
@@ -154,6 +162,24 @@ def _paper(name: str, block: SampleBlock) -> Figure:
 def _live(name: str, make: Callable[[], StepCounter], block: SampleBlock) -> Figure:
     parts = pieces(yardsticks.head(block, (LIVE_FROM + LIVE_PACKETS) * PACKET_SAMPLES), PACKET_SAMPLES)
     return _per_packet(name, parts, lambda: make().update)
+
+
+def _sessions(name: str, block: SampleBlock) -> Figure:
+    """Count SESSIONS by turns, compiled where numba is there, as a service with so many devices does."""
+    parts = pieces(yardsticks.head(block, (LIVE_FROM + SESSION_PACKETS) * PACKET_SAMPLES), PACKET_SAMPLES)
+    sessions = [registry.make(name) for _ in range(SESSIONS)]
+
+    def all_take(part: SampleBlock) -> None:
+        for session in sessions:
+            session.update(part)
+
+    with steplink_fast.compiled_live():
+        for part in parts[:LIVE_FROM]:
+            all_take(part)
+        rounds_s = [_seconds_of(all_take, [part]) for part in parts[LIVE_FROM:]]
+    best = [min(rounds_s[first::ROUNDS]) for first in range(min(ROUNDS, len(rounds_s)))]
+    took_s = sum(best) / len(best) / SESSIONS
+    return Figure(name=f"{name} live a hundred sessions", value=took_s * 1e6, unit="us/packet")
 
 
 def _live_packets() -> Figure:

@@ -17,6 +17,7 @@ from service.errors import LinkError, LinkFault, NotNowError, StoreError
 from service.links.ble import DEFAULT_TIMEOUTS, PLATFORM, Backend, BleLink, Sighting, Timeouts, close_stale, scanning
 from service.links.contract import Link
 from service.pipeline.archive import Archive
+from service.pipeline.compilation import Compilation
 from service.pipeline.device import Device
 from service.pipeline.hub import Hub
 from service.pipeline.lifecycle import LINKED, PATIENCE, Cause, Patience
@@ -66,6 +67,7 @@ class Supervisor:
         self._roster = Roster()
         self._archive = archive
         self._tasks: asyncio.TaskGroup | None = None
+        self._compilation = Compilation()
 
     @property
     def devices(self) -> list[Device]:
@@ -221,6 +223,7 @@ class Supervisor:
         link = BleLink(sighting.handle, device.wearable.handshake(), self._backend, self._timeouts)
         device.task = tasks.create_task(self._hold(device, link, settled), name=f"link {device.address}")
         device.task.add_done_callback(lambda _: settled.set())
+        self._compilation.consider(sum(one.state in LINKED for one in self._roster.devices), self._lineup.makers)
         await settled.wait()
 
     async def _hold(self, device: Device, link: Link, settled: asyncio.Event) -> None:

@@ -117,27 +117,23 @@ def rows_of(values):
 
 
 def test_frames_alone_and_together_give_the_same_bits(rows):
-    weights = steplink_weights.shipped().weights
-    sensed = rows[: len(rows) // 12 * 12, : front.SENSED].astype(np.float32).reshape(-1, 12, front.SENSED)
-    past, one = network.fresh_past(), network.fresh_past()
-    together = network.run(weights, sensed, past)
-    alone = np.concatenate([network.run(weights, sensed[i : i + 1], one) for i in range(len(sensed))])
-    assert np.array_equal(together, alone)
-    assert all(np.array_equal(a, b) for a, b in zip(past, one, strict=True))
-    assert np.array_equal(together, np.rint(together))
+    sensed = rows[: len(rows) // 12 * 12, : front.SENSED]
+    frames = len(sensed) // 12
+    together, alone, begun = (network.Stream(steplink_weights.shipped().weights, n) for n in (frames, 1, 1))
+    logits = together.run(sensed)
+    assert np.array_equal(logits, np.concatenate([alone.run(sensed[12 * i : 12 * i + 12]) for i in range(frames)]))
+    assert np.array_equal(logits, np.concatenate([begun.run(sensed[:60]), begun.run(sensed[60:])]))
+    assert np.array_equal(together.past, alone.past)
+    assert np.array_equal(together.past, begun.past)
+    assert np.array_equal(logits, np.rint(logits))
 
 
 @settings(max_examples=20, deadline=None)
-@given(sensed=hnp.arrays(np.float32, (3, 12, front.SENSED), elements=st.sampled_from([-1023.0, 0.0, 1.0, 1023.0])))
+@given(sensed=hnp.arrays(np.float64, (36, front.SENSED), elements=st.sampled_from([-1023.0, 0.0, 1.0, 1023.0])))
 def test_no_sum_of_the_network_is_too_large_to_be_exact(sensed):
     weights = steplink_weights.shipped().weights
-    exact = network.Weights(
-        [kernel.astype(np.float64) for kernel in weights.kernels], [bias.astype(np.float64) for bias in weights.biases]
-    )
-    past = [one.astype(np.float64) for one in network.fresh_past()]
-    assert np.array_equal(
-        network.run(weights, sensed, network.fresh_past()), network.run(exact, sensed.astype(np.float64), past)
-    )
+    exact = network.Weights(weights.flat.astype(np.float64))
+    assert np.array_equal(network.Stream(weights, 3).run(sensed), network.Stream(exact, 3).run(sensed))
 
 
 def test_every_layer_s_largest_sum_fits_float32():
@@ -166,15 +162,24 @@ def test_weights_of_another_shape_are_refused():
 def test_autocorrelation_finds_the_cadence_near_a_rough_one():
     t_s = np.arange(rhythm.WINDOW) / rhythm.ROWS_HZ
     columns = np.rint(100.0 * np.stack([np.sin(2 * np.pi * 1.83 * t_s + phase) for phase in (0.0, 1.0, 2.0, 3.0)]))
-    r = rhythm.correlations(rhythm.windows(columns))
     for rough in (1.5, 1.7, 2.1):
-        assert rhythm.refined_hz(np.array([rough]), r)[0] == pytest.approx(1.83, rel=0.02)
+        assert rhythm.refined_hz([rough], rhythm.correlations(columns[None]))[0] == pytest.approx(1.83, rel=0.025)
     noise = np.rint(100.0 * np.random.default_rng(1).standard_normal((4, rhythm.WINDOW)))
-    assert rhythm.refined_hz(np.array([1.7]), rhythm.correlations(rhythm.windows(noise)))[0] == 1.7
+    assert rhythm.refined_hz([1.7], rhythm.correlations(noise[None]))[0] == 1.7
+
+
+def test_windows_hold_the_last_rows_however_they_come(rows):
+    columns = rows[: len(rows) // 12 * 12, front.SENSED :]
+    by_one, together = rhythm.Windows(), rhythm.Windows()
+    alone = [by_one.take(columns[i : i + 12])[0].copy() for i in range(0, len(columns), 12)]
+    assert np.array_equal(together.take(columns), alone)
+    assert np.array_equal(together.past, by_one.past)
+    assert np.array_equal(alone[-1], columns[-rhythm.WINDOW :].T)
+    assert not alone[0][:, :-12].any()
 
 
 def test_a_window_of_stillness_has_no_rhythm():
-    r = rhythm.correlations(rhythm.windows(np.full((rhythm.COLUMNS, rhythm.WINDOW), 256.0)))
+    r = rhythm.correlations(np.full((1, rhythm.COLUMNS, rhythm.WINDOW), 256.0))
     assert not r.any()
 
 

@@ -30,7 +30,7 @@ def test_the_names_and_units_are_those_fixed_for_tools():
         "double_threshold offline fast / minimal loop": "ratio",
         "double_threshold offline plain": "samples/s",
         "double_threshold live": "us/packet",
-        "double_threshold live from bytes": "us/packet",
+        f"{registry.DEFAULT} live from bytes": "us/packet",
         "double_threshold offline fast with reading and resampling": "samples/s",
     }
     assert all(0 < figure.value < 1e12 for figure in found.values())
@@ -47,6 +47,32 @@ def test_every_counter_is_measured_without_numba_too(monkeypatch):
     assert {name for name in registry.COUNTERS if f"{name} offline plain" in names} == set(registry.COUNTERS)
     measured = [name.split()[0] for name in names if name.endswith("/ Chen 2015")]
     assert measured == [name for name in registry.COUNTERS if name in bench.PAPER_S]
+
+
+@pytest.mark.usefixtures("once")
+def test_our_own_counter_has_its_model_and_a_hundred_sessions_measured_too(monkeypatch):
+    taken = []
+    monkeypatch.setattr(bench, "SESSIONS", 3)
+    monkeypatch.setattr(bench, "SESSION_PACKETS", 24)
+    monkeypatch.setattr(bench, "available", lambda: False)
+    monkeypatch.setattr(bench.steplink_fast, "kernel", lambda: taken.append("compiled"))
+    found = {figure.name: figure for figure in bench.figures(["steplink"], SAMPLES)}
+    assert taken == ["compiled"]
+    assert found["model load"].unit == "ms"
+    assert found["steplink live a hundred sessions"].unit == "us/packet"
+    assert 0 < found["steplink live a hundred sessions"].value < 1e6
+
+
+def test_a_round_of_sessions_counts_as_the_best_of_its_kind(monkeypatch):
+    clock = iter(range(1000))
+    monkeypatch.setattr(bench, "SESSIONS", 2)
+    monkeypatch.setattr(bench, "LIVE_FROM", 0)
+    monkeypatch.setattr(bench, "ROUNDS", 2)
+    monkeypatch.setattr(bench, "SESSION_PACKETS", 4)
+    monkeypatch.setattr(bench.steplink_fast, "kernel", lambda: None)
+    monkeypatch.setattr(bench.time, "perf_counter", lambda: float(next(clock)) ** 2)
+    figure = bench._sessions("steplink", yardsticks.walk(100))
+    assert figure.value == pytest.approx((1 + 5) / 2 / 2 * 1e6)  # rounds of 1, 5, 9, 13 seconds
 
 
 def test_the_best_of_each_is_taken_by_turns(monkeypatch):

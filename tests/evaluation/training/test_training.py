@@ -64,7 +64,8 @@ def test_the_network_that_learns_is_the_one_that_counts(trained, teaching):
     arrays = trained.kept[-1].arrays
     learnt, cadence_hz = model.answers(model.plain(arrays), rows, exact=True)
     weights = network.weights_of(dict(arrays))
-    counts = np.stack([network.run(weights, one, network.fresh_past()) for one in rows])[:, network.DELAY :]
+    sensed = rows.reshape(len(rows), -1, rows.shape[-1])
+    counts = np.stack([network.Stream(weights).run(one) for one in sensed])[:, network.DELAY :]
     assert np.array_equal(np.asarray(learnt) * (network.UNIT * network.WEIGHT_UNIT), counts[..., 0])
     logit = counts[..., 1] / (network.UNIT * network.WEIGHT_UNIT)
     assert np.asarray(cadence_hz) == pytest.approx(0.6 + 3.2 / (1.0 + np.exp(0.5 - logit)), abs=1e-5)
