@@ -202,7 +202,7 @@ def add_evaluation(parser: argparse.ArgumentParser) -> None:
     """Add what `evaluate` takes."""
     parser.add_argument("path", metavar="PATH", nargs="*", help="a recording, or a folder that is searched through")
     add_columns(parser)
-    _add_counter(parser, "counters to evaluate, or all (default double_threshold)")
+    _add_counter(parser, f"counters to evaluate, or all (default {Settings().counter})")
     parser.add_argument(
         "--preset", choices=("paper", "tuned"), help="their parameters (default tuned, with --paper the published ones)"
     )

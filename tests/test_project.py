@@ -162,7 +162,8 @@ def test_the_readme_starts_with_its_two_commands(command):
 @pytest.mark.parametrize("field", dataclasses.fields(Settings), ids=lambda field: field.name)
 def test_every_option_is_documented_as_its_help_says(field):
     assert field.metadata["text"]
-    default = "none" if field.default in {(), ""} else f"`{field.default}`"
+    said = " ".join(field.default) if isinstance(field.default, tuple) else field.default
+    default = "none" if said == "" else f"`{said}`"
     row = f"| `--{field.name.replace('_', '-')}` | {default} | {field.metadata['text']} |"
     assert row in README + GUIDE
 

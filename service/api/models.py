@@ -43,11 +43,12 @@ class Device(BaseModel):
     reason: str | None = Field(description="Why it is lost, as a sentence")
     since: datetime = Field(description="When it came into this state", examples=[_AT])
     session_since: datetime = Field(description="Since when `steps` counts", examples=[_AT])
-    primary: str = Field(description="Counter whose count `steps` is", examples=["double_threshold"])
+    primary: str = Field(description="Counter whose count `steps` is", examples=["steplink"])
     steps: int = Field(description="Confirmed steps since the session began; never falls", examples=[128])
     steps_now: int = Field(description="`steps` plus those that are likely; may fall", examples=[130])
     counters: dict[str, int] = Field(
-        description="Each counter's own confirmed steps since it began", examples=[{"double_threshold": 128}]
+        description="Each counter's own confirmed steps since it began",
+        examples=[{"steplink": 128, "double_threshold": 169}],
     )
     counter_faults: dict[str, str] = Field(
         description="Why a counter does not count: a sensor the device lacks or does not send, or under 10 samples a"
@@ -118,7 +119,10 @@ class _Durable(_Event):
 
 
 class StepEvent(_Durable):
-    """One confirmed step. `strength`, `peak`, `valley` and both thresholds are in g on the filtered signal."""
+    """One confirmed step. `strength`, `peak`, `valley` and both thresholds are in g on the filtered signal.
+
+    `upper` and `lower` are null for a counter without thresholds.
+    """
 
     type: Literal["step"] = "step"
     device_s: float = Field(description="Device time of the step", examples=[21.34])
@@ -317,7 +321,8 @@ class ParameterModel(BaseModel):
     high: float | None = Field(description="Largest value, inclusive")
     options: list[str] | None = Field(description="The words it takes")
     presets: dict[str, float | str] = Field(
-        description="Its value in each preset", examples=[{"paper": 1.0, "tuned": 5.75}]
+        description="Its value in each preset; steplink has no paper, and both are the same",
+        examples=[{"paper": 1.0, "tuned": 5.75}],
     )
 
 
@@ -342,7 +347,7 @@ class ChoiceModel(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     name: str = Field(examples=["double_threshold"])
-    preset: str = Field(default="tuned", description="paper or tuned")
+    preset: str = Field(default="tuned", description="paper or tuned; steplink has no paper, and either is the same")
     params: dict[str, Annotated[float, Strict()] | str] = Field(default_factory=dict, examples=[{"rest_raw": 4.0}])
 
 

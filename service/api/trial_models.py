@@ -50,7 +50,7 @@ class TrialRow(BaseModel):
 
     device: str = Field(examples=["sim-1"])
     wrist: Literal["left", "right"] | None
-    counter: str = Field(description="The device's primary when the trial began", examples=["double_threshold"])
+    counter: str = Field(description="The device's primary when the trial began", examples=["steplink"])
     steps: int = Field(description="Confirmed steps in the trial", examples=[196])
     steps_now: int = Field(description="`steps` plus those that are likely; may fall", examples=[196])
     error: int | None = Field(description="`steps` − true", examples=[-4])

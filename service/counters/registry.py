@@ -38,7 +38,10 @@ GYROSCOPE: Final = frozenset({Sensor.GYROSCOPE})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CounterKind:
-    """One algorithm: `presets` holds its parameter sets `paper` and `tuned`, `build` makes a counter of one."""
+    """One algorithm: `presets` holds its parameter sets `paper` and `tuned`, `build` makes a counter of one.
+
+    Both names are known for every counter, since tools ask for either of all; ours has no paper, and both are the same.
+    """
 
     name: str
     params: type

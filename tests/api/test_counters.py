@@ -40,19 +40,19 @@ async def test_every_counter_tells_its_parameters_with_unit_range_and_presets(wa
 
 async def test_other_parameters_begin_a_segment_and_the_count_never_falls(walk):
     lineup = (await walk.http.get("api/v1/devices/sim-1/counters")).json()
-    assert lineup == {"counters": [{"name": "double_threshold", "preset": "tuned", "params": {}}]}
+    assert lineup == {"counters": [{"name": "steplink", "preset": "tuned", "params": {}}]}
     async with walk.live() as feed:
         before = (await walk.device())["steps"]
-        wanted = {"counters": [{"name": "double_threshold", "preset": "tuned", "params": {"bout": 3}}]}
+        wanted = {"counters": [{"name": "steplink", "preset": "tuned", "params": {"least_steps": 5}}]}
         answer = await walk.http.put("api/v1/devices/sim-1/counters", json=wanted)
         assert answer.json() == wanted
         async with asyncio.timeout(10):
             while (message := json.loads(await feed.recv()))["type"] != "segment":
                 pass
-        assert message["primary"] == "double_threshold"
+        assert message["primary"] == "steplink"
         assert message["steps"] >= before
     device = await walk.until(lambda device: device["steps"] > message["steps"])
-    assert device["counters"]["double_threshold"] == device["steps"] - message["steps"]
+    assert device["counters"]["steplink"] == device["steps"] - message["steps"]
 
 
 @pytest.mark.parametrize(
@@ -89,6 +89,8 @@ async def test_after_a_refusal_the_device_counts_on_and_takes_the_next_lineup(wa
 
 
 async def test_the_feed_tells_steps_of_the_counters_asked_for(walk):
+    alone = {"counters": [{"name": "double_threshold"}]}
+    assert (await walk.http.put("api/v1/devices/sim-1/counters", json=alone)).status_code == 200
     async with walk.live("?counters=double_threshold") as feed, asyncio.timeout(10):
         while (message := json.loads(await feed.recv()))["type"] != "step":
             pass

@@ -50,7 +50,7 @@ async def test_durable_events_are_numbered_without_holes(walk):
     assert len(ordinals) > 5
 
 
-async def test_the_signal_holds_the_thresholds_and_the_peaks_of_the_steps(walk):
+async def test_the_signal_holds_the_peaks_of_the_steps(walk):
     async with walk.live() as feed:
         heard = await messages(feed, 300)
     values = {}
@@ -61,12 +61,22 @@ async def test_the_signal_holds_the_thresholds_and_the_peaks_of_the_steps(walk):
     assert len(steps) > 5
     for step in steps:
         assert values[round(step["device_s"] * 50)] == pytest.approx(step["peak"], abs=1e-4)
+
+
+async def test_of_a_counter_that_has_thresholds_signal_and_steps_hold_them():
+    how = {"speed": 8, "counter": "double_threshold"}
+    async with staged(Bracelet(Walker("normal:600", seed=3)), **how) as stage, stage.live() as feed:
+        heard = await messages(feed, 150)
     assert any(message["bands"] for message in heard if message["type"] == "signal")
+    steps = [message for message in heard if message["type"] == "step"]
+    assert len(steps) > 5
+    assert all(step["peak"] > step["upper"] > step["lower"] > step["valley"] for step in steps)
 
 
 @pytest.mark.full
 async def test_each_step_is_told_within_a_quarter_second_of_its_peak_then_confirmed_or_retracted():
-    async with staged(Bracelet(Walker("normal:600", seed=3))) as stage, stage.live() as feed:
+    bracelet = Bracelet(Walker("normal:600", seed=3))
+    async with staged(bracelet, counter="double_threshold") as stage, stage.live() as feed:
         began, heard = time.time(), []
         while time.time() < began + 20:
             heard.append((json.loads(await feed.recv()), time.time()))

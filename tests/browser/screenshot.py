@@ -1,6 +1,6 @@
 """Take the README's picture of the page: `python tests/browser/screenshot.py [--phone] [--dark] [FILE]`.
 
-It starts the demo with two counters beside the primary, waits until some thirty steps are counted and the plot is
+It starts the demo with two counters beside the default, waits until some thirty steps are counted and the plot is
 full, and writes a PNG of at most MOST_BYTES.
 """
 
@@ -28,7 +28,7 @@ def main() -> int:
     parser.add_argument("--phone", action="store_true", help="390 × 844 instead of 1280 × 800")
     parser.add_argument("--dark", action="store_true", help="the dark theme")
     options = parser.parse_args()
-    beside = ("--beside", "autocorrelation", "--beside", "adaptive_peak")
+    beside = ("--beside", "double_threshold", "--beside", "adaptive_peak")
     with running("demo", "--port", "0", *beside, says=r"http://\S+/") as (_, url), running_browser() as browser:
         page = browser.new_page(
             viewport=PHONE if options.phone else DESKTOP,

@@ -33,20 +33,23 @@ def wait_for_steps(page: Page, steps: int) -> None:
     )
 
 
-def test_steps_appear_as_they_happen(page: Page) -> None:
+@pytest.mark.parametrize(
+    ("counter", "colour"), [("steplink", "mark-rose"), pytest.param("double_threshold", "step", marks=pytest.mark.full)]
+)
+def test_steps_appear_as_they_happen(page: Page, counter: str, colour: str) -> None:
     errors: list[str] = []
     page.on("console", lambda message: errors.extend([message.text] * (message.type == "error")))
     page.on("pageerror", lambda error: errors.append(str(error)))
-    with running("demo", "--port", "0", says=URL) as (_, url):
+    with running("demo", "--port", "0", "--counter", counter, says=URL) as (_, url):
         page.goto(url)
         expect(field(page, "state")).to_have_text("Live", timeout=20_000)
         wait_for_steps(page, 3)
         before = page.evaluate(PICTURE)
         wait_for_steps(page, 8)
         assert page.evaluate(PICTURE) != before
-        assert len(clusters(columns(page, "step"))) >= 5
+        assert len(clusters(columns(page, colour))) >= 5
         assert sum(columns(page, "signal")) > 500
-        assert sum(columns(page, "upper")) > 50
+        assert (sum(columns(page, "upper")) > 50) is (counter == "double_threshold"), "steplink has no thresholds"
         shown = count(page)
         (device,) = page.request.get(f"{url}api/v1/devices").json()["items"]
         assert shown <= device["steps"] <= shown + 3

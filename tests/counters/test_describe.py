@@ -34,7 +34,7 @@ def test_every_counter_names_its_source_and_latency():
 
 
 def test_an_unknown_counter_is_told():
-    with pytest.raises(CounterError, match="there are double_threshold"):
+    with pytest.raises(CounterError, match="there are steplink, double_threshold"):
         describe.parameters("abacus")
 
 

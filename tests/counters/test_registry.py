@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import pytest
 
+from service.config import Settings
 from service.counters import registry
 from service.counters.double_threshold import TUNED
 from service.errors import CounterError, ParameterError
@@ -31,8 +32,14 @@ def test_every_parameter_says_what_it_is_and_every_preset_is_in_range(name):
         assert registry.parameters(name, preset, dataclasses.asdict(params)) == params
 
 
-def test_the_default_is_there():
-    assert registry.DEFAULT in registry.COUNTERS
+def test_the_default_and_what_runs_beside_it_are_there_and_are_the_options_defaults():
+    assert {registry.DEFAULT, registry.BESIDE} <= registry.COUNTERS.keys()
+    assert (Settings().counter, Settings().beside) == (registry.DEFAULT, (registry.BESIDE,))
+
+
+def test_only_steplink_has_no_paper_and_its_presets_are_the_same():
+    same = [name for name, kind in registry.COUNTERS.items() if kind.presets["paper"] == kind.presets["tuned"]]
+    assert same == ["steplink"]
 
 
 def test_tuned_is_the_default_preset():

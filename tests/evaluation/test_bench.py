@@ -33,7 +33,7 @@ def test_the_names_and_units_are_those_fixed_for_tools():
         "double_threshold offline fast / minimal loop": "ratio",
         "double_threshold offline plain": "samples/s",
         "double_threshold live": "us/packet",
-        "double_threshold live from bytes": "us/packet",
+        f"{registry.DEFAULT} live from bytes": "us/packet",
         "double_threshold offline fast with reading and resampling": "samples/s",
     }
     assert all(0 < figure.value < 1e12 for figure in found.values())

@@ -72,7 +72,8 @@ def test_rows_say_what_was_learnt_and_where_nothing_was(tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--calibrate", "still.npz"], "no walk was found"),
+        (["--calibrate", "still.npz", "--counter", "double_threshold"], "no walk was found"),
+        (["--calibrate", "middle"], "steplink cannot learn"),
         (["--calibrate", "absent.npz"], "absent.npz"),
         (["--calibrate", "middle", "--counter", "plus_minus"], "cannot learn"),
         (["--calibrate", "middle", "--paper", "wang2018"], "say themselves"),

@@ -30,7 +30,7 @@ def jittered(seed, seconds, rate_hz):
 
 def test_a_walk_is_counted_at_its_crests():
     made = walk(20, 100)
-    counted = count(made)
+    counted = count(made, "double_threshold")
     assert counted.steps == 40
     assert counted.step_t_s == pytest.approx(made.step_t_s, abs=0.02)
     assert counted.samples == 1000
@@ -73,7 +73,7 @@ def test_a_block_is_counted_as_its_recording():
 
 
 def test_overrides_reach_the_counter():
-    assert count(walk(10), overrides={"rest_raw": "64"}).steps == 0
+    assert count(walk(10), "double_threshold", overrides={"rest_raw": "64"}).steps == 0
 
 
 @pytest.mark.parametrize("fast", [True, False])
@@ -114,4 +114,4 @@ def test_a_missing_sensor_a_wrong_name_and_a_wrong_parameter_are_refused(monkeyp
         count(walk(), overrides={"colour": "red"})
     monkeypatch.setattr(registry, "COUNTERS", {"double_threshold": kind})
     with pytest.raises(CounterError, match="needs gyroscope"):
-        count(still())
+        count(still(), "double_threshold")

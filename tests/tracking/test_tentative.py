@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
-from service.counters.registry import DEFAULT, make
+from service.counters.registry import BESIDE, DEFAULT, make
 from service.samples import DeviceInfo, Packet, RawBlock, Step, StepCounted, Tentative
 from service.tracking.tentative import TentativeSteps
 from service.tracking.tracker import Tracker
@@ -68,10 +68,10 @@ def test_resumes_from_a_snapshot(cut):
     assert before + [second.follow("counter", 1, *turn) for turn in turns[cut:]] == expected
 
 
-def walked(samples_a_packet, *, seconds=20):
+def walked(samples_a_packet, counter="double_threshold", *, seconds=20):
     """Events of a bracelet's walk, and the device time of the newest sample when each was told."""
     bracelet = Bracelet(Walker(f"rest:2,normal:{seconds}", seed=4), packet_samples=samples_a_packet)
-    tracker = Tracker(wire.Bracelet(), {DEFAULT: lambda: make(DEFAULT)}, primary=DEFAULT)
+    tracker = Tracker(wire.Bracelet(), {counter: lambda: make(counter)}, primary=counter)
     for packet in described():
         tracker.apply(packet)
     heard = []
@@ -83,11 +83,12 @@ def walked(samples_a_packet, *, seconds=20):
     return heard + [(event, tracker.now_s) for event in tracker.finish()]
 
 
-@settings(max_examples=8, deadline=None)
+@pytest.mark.parametrize("counter", [DEFAULT, BESIDE])
+@settings(max_examples=4, deadline=None)
 @given(size=st.integers(1, 84))
-def test_each_step_is_told_before_it_is_confirmed_and_each_likely_one_decided(size):
+def test_each_step_is_told_before_it_is_confirmed_and_each_likely_one_decided(size, counter):
     open_s, confirmed = set(), []
-    for event, _ in walked(size):
+    for event, _ in walked(size, counter):
         if isinstance(event, Tentative):
             assert event.retracted == (event.at_s in open_s)
             (open_s.discard if event.retracted else open_s.add)(event.at_s)
@@ -110,6 +111,20 @@ def test_each_step_is_told_within_a_quarter_of_a_second(size, most_s):
     assert np.mean([first[at_s][1] for at_s in steps]) > 0.8
     sure = {at_s for at_s, (_, passes) in first.items() if passes}
     assert len(sure - set(steps)) <= 0.1 * len(steps)
+
+
+@pytest.mark.parametrize("size", [8, 10])
+def test_steplink_tells_a_walk_s_steps_within_half_a_second_once_it_is_certain(size):
+    first, certain_s, late_s = {}, None, []
+    for event, now_s in walked(size, "steplink"):
+        if isinstance(event, Tentative) and not event.retracted:
+            first.setdefault(event.at_s, now_s)
+        if isinstance(event, StepCounted):
+            certain_s = certain_s or now_s
+            if event.step.at_s > certain_s:
+                late_s.append(first[event.step.at_s] - event.step.at_s)
+    assert len(late_s) >= 20
+    assert np.quantile(late_s, 0.9) <= 0.5
 
 
 def test_times_say_how_well_they_are_known():

@@ -30,7 +30,7 @@ CLIP_FRAMES: Final = 250
 CLIP: Final = CLIP_FRAMES * FRAME
 SPANS: Final = 4
 """Recordings of known number in one clip."""
-SHORT_SHARE: Final = 0.2
+SHORT_SHARE: Final = 0.12
 """Pieces of walks with known step times that are a few steps and then a stand."""
 SWUNG_SHARE: Final = 0.5
 """Of the same at the body, those that are hung on an arm."""

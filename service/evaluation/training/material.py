@@ -52,7 +52,7 @@ WEIGHTS: Final = {
     "pebble_wrist/still": 0.08,
     "device_sim/walk": 0.07,
     "device_sim/still": 0.05,
-    "exercises/still": 0.13,
+    "exercises/still": 0.1,
 }
 """How often a piece of a clip is of a pool: half of the walks of the wrist, and all that was hard to refuse often."""
 

@@ -77,8 +77,8 @@ def test_frames_of_a_walk_move_and_frames_of_rest_do_not(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_timed_walk_has_the_pace_it_was_stretched_to(seed):
     clip = sampler(material(seconds=60.0), seed=seed).clip()
-    inside = (clip.density_weight > 0) & (clip.walking == 1.0)
-    assert inside.sum() > 100
+    inside = np.convolve((clip.density_weight > 0) & (clip.walking == 1.0), np.ones(3), "same") == 3  # no piece's end
+    assert inside.sum() > 50
     assert clip.density[inside].min() > 2.0 * SLOWEST - 0.1
     assert clip.density[inside].max() < 2.0 * FASTEST + 0.1
 
