@@ -17,6 +17,19 @@ from service.samples import GRID_HZ, SampleBlock, Sensor
 pytestmark = pytest.mark.full
 
 LIMITS = {
+    "steplink": {
+        "eth2023_wrist": 26.0,
+        "eth2022_wrist": 9.0,
+        "banglejs_walk": 2.0,
+        "pebble_wrist": 3.0,
+        "oxford_opt": 1.2,
+        "brajdic_walk": 2.0,
+        "dcaiti": 2.2,
+        "negatives_hmp": 8,
+        "negatives_spar_watch": 90,
+        "negatives_banglejs": 8,
+        "brajdic_handling": 40,
+    },
     "double_threshold": {
         "eth2023_wrist": 35.0,
         "eth2022_wrist": 7.4,
