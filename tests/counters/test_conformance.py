@@ -34,8 +34,8 @@ OUTSIDE = {
 }
 """Walks that a paper's own limits exclude: peaks up to 1.2 g; steps outside 0.3 to 0.8 s, and 0.4 to 1 s.
 
-steplink takes a pure sine as fast as a run and as weak as that for no run: it counts 0 of 40 at 2.9 Hz and 0.2 g, and 40
-at 0.6 g. That is what its weights do and not a limit that it declares.
+steplink takes a pure sine as fast as a run and as weak as that for no run: it counts 0 of 40 at 2.9 Hz and 0.2 g, and
+40 at 0.6 g. That is what its weights do and not a limit that it declares.
 """
 
 TOLD_WITHIN = {("double_threshold", "paper"): 2, "autocorrelation": None, "steplink": None}
