@@ -40,7 +40,20 @@ def folder(tmp_path_factory):
 
 def test_a_folder_is_evaluated(folder, tmp_path, bare):
     out = tmp_path / "rows.json"
-    answer = run("evaluate", "walks", "rests", ".", "--json", out, "--jobs", 2, cwd=folder, **bare)
+    answer = run(
+        "evaluate",
+        "walks",
+        "rests",
+        ".",
+        "--counter",
+        "double_threshold",
+        "--json",
+        out,
+        "--jobs",
+        2,
+        cwd=folder,
+        **bare,
+    )
     assert answer.returncode == 0, answer.stderr
     assert "passed over texts without acceleration: ./index.csv (--columns" in answer.stderr
     assert answer.stderr.count("\n") == 1
@@ -80,7 +93,7 @@ def test_where_nothing_is_counted_the_exit_code_is_1(folder):
         (["evaluate"], "PATH"),
         (["evaluate", "absent"], "no such file"),
         (["evaluate", "walks", "--counter", "abacus"], "double_threshold"),
-        (["evaluate", "walks", "--param", "double_threshold.bout=99"], "from 2 to 12"),
+        (["evaluate", "walks", "--param", "steplink.pause=99"], "from 0 to 6"),
         (["evaluate", "walks", "--param", "bout=3"], "NAME.KEY=V"),
         (["evaluate", "walks", "--json", "absent/rows.json"], "folder that exists"),
         (["evaluate", "walks", "--units", "mg"], "--columns"),
