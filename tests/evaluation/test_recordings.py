@@ -108,7 +108,8 @@ def documented(name):
 @pytest.mark.parametrize("preset", PRESETS)
 def test_evaluate_gives_the_figures_of_the_docstring(recordings, tmp_path, preset):
     out, wanted = tmp_path / "rows.json", documented(preset)
-    words = ["evaluate", *(str(recordings / dataset) for dataset in wanted), "--preset", preset, "--json", str(out)]
+    words = ["evaluate", *(str(recordings / dataset) for dataset in wanted), "--counter", "double_threshold"]
+    words += ["--preset", preset, "--json", str(out)]
     answer = subprocess.run([sys.executable, "-m", "service.cli", *words], capture_output=True, text=True, check=False)
     assert answer.returncode == 0, answer.stderr
     rows = json.loads(out.read_text("utf-8"))
