@@ -19,7 +19,7 @@ from service.store import database
 from service.store.reader import Reader
 from service.store.values import LogQuery
 
-COUNTERS = ("double_threshold", "adaptive_peak")
+COUNTERS = ("steplink", "double_threshold")
 WALK = "normal:30,slow:20,rest:6,type:8,fast:20,run:15,rest:5,normal:45"
 SEED = 7
 SPEED = 8

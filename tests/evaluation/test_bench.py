@@ -100,7 +100,7 @@ def test_the_walk_is_as_long_as_asked_holds_all_sensors_and_is_counted():
     assert all(column.dtype == np.float64 and column.flags.c_contiguous for column in columns)
     assert np.array_equal(block.acc_g[0][30_000:], block.acc_g[0][:5000])
     assert len(yardsticks.head(block, 100)) == len(yardsticks.head(block, 100).mag_ut[2]) == 100
-    steps = count(yardsticks.head(block, 30_000)).steps
+    steps = count(yardsticks.head(block, 30_000), "double_threshold").steps
     assert 800 < steps < 1300
 
 
