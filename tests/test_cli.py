@@ -102,7 +102,7 @@ def test_a_demo_on_two_wrists_counts_both_alike():
         assert {device: one["name"] for device, one in found.items()} == {"sim-1": "Left", "sim-2": "Right"}
         for one in found.values():
             assert one["samples"] == 1000
-            assert one["counters"]["double_threshold"] == pytest.approx(36, abs=6)
+            assert one["counters"]["steplink"] == pytest.approx(36, abs=6)
             assert one["counters"]["gyro_zero_crossing"] == pytest.approx(36, abs=8)
         ends_cleanly(demo, signal.SIGINT)
 

@@ -15,8 +15,9 @@ from test_project import ROOT, START
 
 pytestmark = pytest.mark.full
 
-FIRST_STEP_S = 6.0
-"""From the start of `steplink demo` to the first counted step."""
+FIRST_STEP_S = 9.0
+"""From the start of `steplink demo` to the first counted step: the default counter is sure of a walk once it has seen
+four steps and two seconds more."""
 MEMORY_BYTES = 180e6
 CTRL_C_S = 2.0
 POLL_S = 0.05
