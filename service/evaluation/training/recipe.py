@@ -20,4 +20,4 @@ ARMS: Final = 300
 
 TUNING_STEPS: Final = 120
 TUNING_RATE: Final = 5e-4
-"""Of a fine-tuning: an eighth of the usual highest rate, for a twelfth of the steps. Ours."""
+"""Of a fine-tuning: an eighth of the usual highest rate, for a twenty-fifth of the steps. Ours."""

@@ -92,7 +92,9 @@ class Trained:
 def require_framework() -> None:
     """Raise TrainingError where the extra `train` is not installed."""
     if missing := [name for name in NEEDED if not _installed(name)]:
-        raise TrainingError(f"{' and '.join(missing)} is missing: pip install 'steplink[train]'")
+        raise TrainingError(
+            f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing: pip install 'steplink[train]'"
+        )
 
 
 def _installed(name: str) -> bool:
