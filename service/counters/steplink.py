@@ -43,7 +43,8 @@ from service.samples import GRID_HZ, Column, Columns, Gait, Likely, SampleBlock,
 from service.signals.compiled import Kernel
 
 NAME: Final = "steplink"
-VERSION: Final = 1
+VERSION: Final = 2
+"""Of the state: 1 did not keep what each frame that waits proved."""
 
 FILTER_DELAY: Final = 2
 """Samples by which the low-pass at 5 Hz lags."""

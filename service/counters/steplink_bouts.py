@@ -1,8 +1,8 @@
 """From frames to steps: when a walk is certain, how many steps it has and when each was; scalar kernels on one state.
 
-Each frame comes with z, the logit of walking, and c, the cadence. Frames above LOW wait; once one of them is above HIGH
-and they hold LEAST steps together the walk is certain and all that wait are credited, as are those that follow, until
-more than POOL frames in a row are not above LOW. A frame credits c times its length, less where the network doubts.
+Each frame comes with z, the logit of walking, and c, the cadence. Frames above LOW wait, WAITING frames at most; once
+one of those that wait is above HIGH, and they hold LEAST steps and EVIDENCE together, the walk is certain and all of
+them are credited, as are those that follow, until more than POOL frames in a row are not above LOW. A frame credits c times its length, less where the network doubts.
 A step is due whenever the sum passes a whole number, and is placed at the crest of the magnitude nearest to where the
 crests before it were: the number comes from the cadence, the time from the crest. A crest lies no more than a step
 after the moment the step was due, never before it, so that no step is confirmed later than a frame and its answer.
@@ -59,8 +59,8 @@ MOVED: Final = 22  # how far the magnitude ranged in it, g
 TOLD: Final = (DECIDED, Z, MOVED, WALKING, CADENCE, WAIT)
 """What is told of walking after every packet."""
 HELD: Final = 23
-"""Frames that wait: index, samples, cadence, share."""
-HELD_ROW: Final = 4
+"""Frames that wait: index, samples, cadence, share, logit."""
+HELD_ROW: Final = 5
 HELD_MAX: Final = 26
 RING: Final = HELD + HELD_ROW * HELD_MAX
 """The magnitude of the last LENGTH samples."""
@@ -164,18 +164,20 @@ def _share(s: State, z: float) -> float:
 
 
 def _hold(s: State, at: int, n: int, z: float, c: float, share: float) -> None:
+    """Let a frame wait; those that have waited too long count no more, neither their steps nor what they proved."""
     count = int(s[WAIT])
     while count > 0 and at - s[HELD] > s[WAITING] * FRAME:
-        s[SUM] -= s[HELD + 2] * s[HELD + 1] / GRID_HZ * s[HELD + 3]
         for i in range(HELD, HELD + (count - 1) * HELD_ROW):
             s[i] = s[i + HELD_ROW]
         count -= 1
     k = HELD + count * HELD_ROW
-    s[k], s[k + 1], s[k + 2], s[k + 3] = float(at), float(n), c, share
+    s[k], s[k + 1], s[k + 2], s[k + 3], s[k + 4] = float(at), float(n), c, share, z
+    _drop(s)
     s[WAIT] = float(count + 1)
-    s[SUM] += c * n / GRID_HZ * share
-    s[TOP] = max(s[TOP], z)
-    s[PROOF] += max(z, 0.0)
+    for k in range(HELD, HELD + (count + 1) * HELD_ROW, HELD_ROW):
+        s[SUM] += s[k + 2] * s[k + 1] / GRID_HZ * s[k + 3]
+        s[TOP] = max(s[TOP], s[k + 4])
+        s[PROOF] += max(s[k + 4], 0.0)
 
 
 def _drop(s: State) -> None:

@@ -215,3 +215,20 @@ def test_latency_is_what_may_wait():
     assert steplink.build().latency_s <= 14.0
     hasty = registry.make("steplink", overrides={"patience": 4})
     assert hasty.latency_s < steplink.build().latency_s
+
+
+def test_a_frame_that_waited_too_long_proves_nothing_any_more():
+    p = steplink.TUNED
+    s = steplink._fresh_bouts(p)
+    bouts.begin(s, 0.0)
+    out = [0.0] * 4000
+    doubtful = 0.5 * (s[bouts.LOW] + s[bouts.HIGH])
+    for number in range(200):
+        at = number * bouts.FRAME
+        s[bouts.NEXT] = float(at + 5 * bouts.FRAME)
+        strong = number == 0
+        assert bouts.frame(s, at, bouts.FRAME, s[bouts.HIGH] + 0.1 if strong else 0.01 * doubtful, 0.7, out, 0) == 0
+        assert s[bouts.WAIT] <= p.patience + 1
+    assert s[bouts.TOP] < s[bouts.HIGH]
+    assert s[bouts.PROOF] < p.evidence
+    assert s[bouts.WALKING] == 0.0
