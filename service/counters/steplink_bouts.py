@@ -2,10 +2,11 @@
 
 Each frame comes with z, the logit of walking, and c, the cadence. Frames above LOW wait, WAITING frames at most; once
 one of those that wait is above HIGH, and they hold LEAST steps and EVIDENCE together, the walk is certain and all of
-them are credited, as are those that follow, until more than POOL frames in a row are not above LOW. A frame credits c times its length, less where the network doubts.
-A step is due whenever the sum passes a whole number, and is placed at the crest of the magnitude nearest to where the
-crests before it were: the number comes from the cadence, the time from the crest. A crest lies no more than a step
-after the moment the step was due, never before it, so that no step is confirmed later than a frame and its answer.
+them are credited, as are those that follow, until more than POOL frames in a row are not above LOW. A frame credits c
+times its length, less where the network doubts. A step is due whenever the sum passes a whole number, and is placed at
+the crest of the magnitude nearest to where the crests before it were: the number comes from the cadence, the time from
+the crest. A crest lies no more than a step after the moment the step was due, never before it, so that no step is
+confirmed later than a frame and its answer.
 
 State and rows are floats; samples are named by their grid index. Plain while live, else compiled; only what numba and
 Python compute to the same bits is used: `+ − × ÷`, comparisons, `exp`, `ceil`, `floor`.

@@ -97,6 +97,7 @@ def parsed(content: bytes) -> Kept:
         KeyError,
         AttributeError,
         TypeError,
+        ValueError,
     ) as error:  # what numpy makes of another file
         raise ValueError("it is no numpy archive") from error
     for name in _NAMES:

@@ -75,8 +75,8 @@ _TRANSITION: Final = re.compile(r"get_?up|stand_?up|sit_?down|lie_?down")
 _BY_ACTIVITY: Final = (
     (_TRANSITION, Family.TRANSITIONS),
     (re.compile(r"exercise|physio|rehab"), Family.EXERCISE),
-    (re.compile(r"driv|desk|typing|pc|rest|reading|sitting"), Family.DRIVING_AND_DESK),
-    (re.compile(r"brush|comb|drink|eat|pour|telephone|wash|dish|cook|dress|lace"), Family.HOUSEHOLD),
+    (re.compile(r"driv|desk|typing|(?<![a-z])pc|(?<![a-z])rest|reading|sitting"), Family.DRIVING_AND_DESK),
+    (re.compile(r"brush|comb|drink|(?<![a-z])eat|pour|telephone|wash|dish|cook|dress|lace"), Family.HOUSEHOLD),
     (re.compile(r"handling"), Family.HANDLING),
 )
 """Of step-free recordings of any other data set; the first that is found."""
@@ -89,7 +89,7 @@ _PHONE: Final = re.compile(r"hand|pocket|pouch|bag|pack|armband|phone")
 class Outcome:
     """One recording and what was counted of it; `true` is None where unknown, `within` what its truth allows.
 
-    `counted` may be a fraction: a network's training counts so.
+    `counted` may be a fraction, as a mean over seeds is.
     """
 
     dataset: str

@@ -75,7 +75,7 @@ def test_another_file_is_refused(tmp_path):
     whole = steplink_weights.packed(steplink_weights.integers(steplink_weights.shipped().weights), {})
     (tmp_path / "one.npy").write_bytes(b"")
     np.save(tmp_path / "one.npy", np.zeros(3))
-    for content in (b"", b"text", whole[:-30], (tmp_path / "one.npy").read_bytes()):
+    for content in (b"", b"text", b"t,x,y,z\n0,0,0,1\n", whole[:-30], (tmp_path / "one.npy").read_bytes()):
         path.write_bytes(content)
         with pytest.raises(ParameterError, match="no weights of `steplink train`"):
             steplink_weights.read(path)

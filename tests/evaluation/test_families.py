@@ -34,6 +34,8 @@ def test_the_examples_of_the_docstrings():
         ("mine", "wrist", "standup_chair", None, 0, Family.TRANSITIONS),
         ("mine", "wrist", "brush_teeth", None, 0, Family.HOUSEHOLD),
         ("mine", "left wrist", "desk-working", None, 0, Family.DRIVING_AND_DESK),
+        ("mine", "wrist", "arm at_rest", None, 0, Family.DRIVING_AND_DESK),
+        ("mine", "wrist", "repeated forest npc", None, 0, None),
         ("mine", None, None, None, 0, None),
         ("mine", "ankle", "walk", "A", 100, None),
         ("mine", "wrist", "walk", "A", None, None),

@@ -36,7 +36,8 @@ sitting down, standing up: each may hide a step) stands apart, without a limit. 
 is `brajdic_handling`."""
 LEARNT: Final = """\
 The counter `steplink` has learnt from some of these very sets, as its model card says: there its figures are those of
-recordings it has seen, and tell nothing of an unseen source. The card has those of its cross-validation."""
+recordings it has seen, and tell nothing of an unseen source. The card has those of
+sources that never taught, and of a cross-validation where its training made one."""
 PARTS: Final = """\
 A recording's share is its own percentage over the sum of its family's, or its false steps over all of them; the largest
 are drawn."""

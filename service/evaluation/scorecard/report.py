@@ -207,7 +207,9 @@ def _disturbed(cards: Sequence[Scorecard]) -> Table:
                 lines.append([family.value, card.counter, *(_over(value, family) for value in values), must])
     return Table(
         title="Disturbed, without steps",
-        note="False steps an hour; a recording whose own rate is no higher is counted as it is.",
+        note="False steps an hour; a recording whose own rate is no higher is counted as it is. What goes through "
+        "packets (re-sent, lost) is rounded as they are, so it may differ a little from the recording as it is; that "
+        "packets re-sent change no count is measured against packets sent once.",
         columns=("family", "counter", NATIVE, *ASKED_DISTURBANCES, "must"),
         lines=lines,
     )

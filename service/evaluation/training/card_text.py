@@ -62,7 +62,8 @@ LIMITS: Final = """\
 - **Cadence** can be told from {slowest} to {fastest} steps a second. In the recordings learnt from that have step times
   it is {walked} (5 and 95 % of the steps). Slower shuffling may be refused, and running faster than 3.2 steps a second
   is not known to be right.
-- **Few steps**: fewer than {least} in one go are not counted, as a rule; nor are single steps about a kitchen.
+- **Few steps**: a walk is certain from {least} steps on, and only if what follows looks like one; of synthetic walkers
+  who stood before and after, those of up to five steps were not counted. Nor are single steps about a kitchen.
 - **Not in the data**, as far as the sets say: children, wheelchairs, walking frames, sticks and crutches, treadmills,
   prams and trolleys, gait changed by illness or injury, devices at the ankle, the foot or the chest. Counts there are
   not known to be right; try them against steps you have counted.

@@ -5,7 +5,7 @@ Everything follows from the seed: material, clips and weights, on the same machi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -16,27 +16,9 @@ from numpy.typing import NDArray
 
 from service.evaluation.training import model
 from service.evaluation.training.clips import Clip, Sampler
-from service.evaluation.training.recipe import AVERAGED, BATCH, DECAY, EXACT_FROM, HIGHEST_RATE, STEPS
+from service.evaluation.training.recipe import AVERAGED, BATCH, DECAY, EXACT_FROM, HIGHEST_RATE
 
 FIELDS: Final = tuple(Clip.__dataclass_fields__)
-
-Told = Callable[[int, float], None]
-
-
-def fit(
-    sampler: Sampler,
-    *,
-    steps: int = STEPS,
-    seed: int = 1,
-    start: model.Params | None = None,
-    rate: float = HIGHEST_RATE,
-    told: Told = lambda _step, _loss: None,
-) -> model.Params:
-    """Return fitted weights in plain units; `told` hears of each step's loss."""
-    params: model.Params = {}
-    for number, value, params in course(sampler, steps=steps, seed=seed, start=start, rate=rate):  # noqa: B007  # the last
-        told(number, value)
-    return params
 
 
 def course(

@@ -7,7 +7,7 @@ truth is approximate, and weighs less.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,9 @@ WEIGHTS: Final = {
 OTHERS: Final = 0.05
 """Of a pool not named there: somebody's own recordings."""
 
+if TYPE_CHECKING:
+    from device_sim.gait import Walker
+
 Floats = NDArray[np.float64]
 
 
@@ -66,7 +69,8 @@ Floats = NDArray[np.float64]
 class Material:
     """One recording: acceleration n × 3 in g on the grid, and its truth.
 
-    `step_s` are the steps' times in seconds after the first sample, None where only their number is known.
+    `subject` is '' where a recording does not say who wore it. `step_s` are the steps' times in seconds after the first
+    sample, None where only their number is known.
     """
 
     source: str
@@ -102,7 +106,7 @@ def material(source: str, recording: Recording) -> Material:
     times = recording.step_t_s
     return Material(
         source=source,
-        subject=recording.subject or recording.path.stem,
+        subject=recording.subject or "",
         placement=recording.placement or "unknown",
         activity=recording.activity or "unknown",
         acc_g=np.column_stack([np.asarray(column) for column in grid_block(recording).acc_g]),
@@ -151,18 +155,20 @@ def synthetic(wearers: int, *, seed: int) -> list[Material]:
             arm_m=float(rng.uniform(0.3, 0.7)),
             noise_g=float(rng.uniform(0.002, 0.02)),
         )
-        samples = round(walker.duration_s * GRID_HZ)
-        acc_g = np.asarray(walker.read(samples), dtype=np.float64)
-        step_s = np.asarray(walker.step_times_until(walker.duration_s))
-        made.append(
-            Material(
-                source=SYNTHETIC,
-                subject=f"walker {number}",
-                placement="wrist",
-                activity="schedule",
-                acc_g=acc_g,
-                true_steps=len(step_s),
-                step_s=step_s,
-            )
-        )
+        made.append(of_walker(walker, number))
     return made
+
+
+def of_walker(walker: Walker, number: int) -> Material:
+    """Return what the sensor of a synthetic wearer gives; whose steps have no times where there are none."""
+    step_s = np.asarray(walker.step_times_until(walker.duration_s))
+    return Material(
+        source=SYNTHETIC,
+        subject=f"walker {number}",
+        placement="wrist",
+        activity="schedule",
+        acc_g=np.asarray(walker.read(round(walker.duration_s * GRID_HZ)), dtype=np.float64),
+        true_steps=len(step_s),
+        step_s=step_s if len(step_s) else None,
+        recording=f"walker {number}",
+    )

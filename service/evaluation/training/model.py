@@ -30,14 +30,12 @@ from service.counters.steplink_network import (
     WIDE,
     Layer,
 )
+from service.counters.steplink_rhythm import SLOWEST_HZ, SPAN_HZ
 from service.evaluation.training.clips import FRAME_S
 
 Array = Any
 Params = dict[str, Array]
 
-SLOWEST_HZ: Final = 0.6
-SPAN_HZ: Final = 3.2
-"""Cadence is SLOWEST_HZ + SPAN_HZ σ(z − 0.5)."""
 DROPPED: Final = 0.1
 """Share of what a frame's layers see that is left out while learning."""
 

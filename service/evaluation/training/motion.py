@@ -177,7 +177,7 @@ def exercise(duration_s: float, rng: Rng) -> Floats:
 
 
 def as_sensed(acc_g: Floats, rng: Rng) -> Floats:
-    """Return it as another sensor would have given it: gain, offset, noise, rate, bits, range, frozen stretches."""
+    """Return it as another sensor would have given it: gain, offset, noise, rate, bits, range."""
     out = acc_g * (1.0 + 0.08 * rng.standard_normal()) if rng.random() < 0.5 else acc_g
     if rng.random() < 0.4:
         out = out * (1.0 + 0.03 * rng.standard_normal(3)) + 0.03 * rng.standard_normal(3)

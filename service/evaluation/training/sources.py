@@ -1,7 +1,7 @@
 """Which recordings teach, which only measure and which are not looked at: the data sets we know, and what is found.
 
-The shipped weights learn only from sets whose licence is stated and suits (`Source.teaches`); the others are the honest
-test of a source that was never seen. AUXILIARY sets are kept for the very end: training neither learns from them nor
+The shipped weights learn only from sets whose licence is stated and suits (all but UNSTATED); the others are the honest
+test of a source that never taught. AUXILIARY sets are kept for the very end: training neither learns from them nor
 looks at them, and so it is with what an `index.csv` lists with another split than dev. Sets of no name here are
 somebody's own: they teach, and whoever trains answers for their licence.
 """
@@ -21,9 +21,10 @@ from service.recordings import read
 
 AUXILIARY: Final = frozenset({"oxford_opt_B", "sensorwatch_magonly", "voisard_lowback"})
 WHY: Final = """\
-The network learns only from sets whose licence is stated and allows it. The others, where they are listed, measure:
-they are the test of a source that was never seen. Sets kept for the end are neither learnt from nor looked at while
-anything is still being chosen."""
+The network learns only from sets whose licence is stated and allows it (of `negatives_banglejs` it is for a part of
+the recordings). The others, where they are listed, measure: they are the test of a source that never taught. They were
+looked at, with the rest, while thresholds and shares were chosen. Sets kept for the end are neither learnt from nor
+looked at while anything is still being chosen."""
 """What the model card says under its table."""
 
 SHORTEST_S: Final = 3.0

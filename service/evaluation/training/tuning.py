@@ -23,11 +23,10 @@ from service.counters.steplink_network import Weights
 from service.evaluation.families import false_per_hour
 from service.evaluation.metrics import error_percent
 from service.evaluation.training.folds import Fold, of_own
-from service.evaluation.training.material import SYNTHETIC, Material, synthetic
+from service.evaluation.training.material import Material, of_walker, synthetic
 from service.evaluation.training.recipe import TUNING_RATE
 from service.evaluation.training.runs import Arrays, Checkpoint, Run, Trained, counted
 from service.evaluation.training.validation import outcome
-from service.samples import GRID_HZ
 
 CHECKPOINTS: Final = (0.25, 0.5, 1.0)
 """Shares of the steps."""
@@ -188,18 +187,7 @@ def quiet(wearers: int, *, seed: int) -> list[Material]:
         walker = Walker(
             QUIET[number % len(QUIET)], seed=int(rng.integers(2**31)), noise_g=float(rng.uniform(0.002, 0.02))
         )
-        acc_g = np.asarray(walker.read(round(walker.duration_s * GRID_HZ)), dtype=np.float64)
-        made.append(
-            Material(
-                source=SYNTHETIC,
-                subject=f"walker {number}",
-                placement="wrist",
-                activity="schedule",
-                acc_g=acc_g,
-                true_steps=walker.true_steps_until(walker.duration_s),
-                recording=f"quiet {number}",
-            )
-        )
+        made.append(of_walker(walker, number))
     return made
 
 

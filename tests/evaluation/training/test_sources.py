@@ -8,7 +8,7 @@ from evaluation.made import save, still, walk
 
 from service.errors import ParameterError, RecordingError
 from service.evaluation import choices
-from service.evaluation.training import sources
+from service.evaluation.training import folds, sources
 from service.evaluation.training.material import UNSTATED
 
 
@@ -42,6 +42,15 @@ def test_sets_are_told_apart(folder):
     refused, left = apart.notes()
     assert refused.startswith("brajdic_walk: the licence is not stated")
     assert left.startswith("later, oxford_opt_B: kept for the end")
+
+
+def test_who_does_not_say_who_they_are_is_one_subject(tmp_path):
+    for name in ("a", "b"):
+        save(walk(10), tmp_path / "mine" / f"{name}.npz")
+    made, _ = sources.load(found(tmp_path), 32)
+    assert [one.recording for one in made] == ["a", "b"]
+    assert len({folds.person(one) for one in made}) == 1
+    assert [fold.held for fold in folds.of_own(made)] == [(0,), (1,)], "apart by recording, not by person"
 
 
 def test_where_nothing_may_teach_it_is_said_why(folder):
