@@ -14,9 +14,10 @@ from device_sim.gait import Walker
 from device_sim.gatt import Start
 from device_sim.source import RecordingSource
 from service.counters.registry import DEFAULT, make
+from service.events import StepCounted
 from service.pipeline.lineup import lineup
 from service.recordings import read
-from service.samples import Packet, RawBlock, Sensor, StepCounted
+from service.samples import Packet, RawBlock, Sensor
 from service.signals.timebase import Timebase
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire

@@ -14,7 +14,7 @@ import pytest
 from processes import Parts
 from undisturbed import LSB_PER_G, Played, Undisturbed
 
-from service.samples import StepCounted
+from service.events import StepCounted
 from service.store import database
 from service.store.reader import Reader
 from service.store.values import LogQuery

@@ -8,7 +8,8 @@ from fakes import described
 from device_sim.bracelet import quantise
 from device_sim.gait import Walker
 from service.counters import registry
-from service.samples import GRID_HZ, TICK_HZ, Packet, Rebooted, StepCounted
+from service.events import Rebooted, StepCounted
+from service.samples import GRID_HZ, TICK_HZ, Packet
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 

@@ -8,8 +8,9 @@ import numpy as np
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters import registry
+from service.events import Rebooted, StepCounted, Tentative
 from service.recordings import read
-from service.samples import GRID_HZ, DeviceInfo, Packet, Rebooted, Reply, Sensor, StepCounted, Tentative
+from service.samples import GRID_HZ, DeviceInfo, Packet, Reply, Sensor
 from service.tracking.backfill import BackfillTracker
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire

@@ -17,9 +17,9 @@ from service.api import models
 from service.api.views import device_view, event_view, utc
 from service.counters import registry
 from service.errors import UnknownDeviceError
+from service.events import StepCounted, Tentative
 from service.pipeline.hub import SlowSubscriberError, Subscription
 from service.pipeline.supervisor import Supervisor
-from service.samples import StepCounted, Tentative
 
 CLOSE_UNKNOWN = 4404
 CLOSE_SLOW = 4408

@@ -11,27 +11,24 @@ from service.api import models
 from service.api.gait_models import GaitModel, RefusedModel
 from service.counters import describe
 from service.counters.registry import CounterKind
-from service.pipeline.device import Device
-from service.pipeline.lifecycle import State
-from service.pipeline.lineup import Lineup
-from service.pipeline.notices import DeviceChanged, Notice, StateChanged
-from service.pipeline.supervisor import Supervisor
-from service.samples import (
+from service.events import (
     Awaited,
-    Band,
     Corrected,
     Counting,
-    DeviceInfo,
-    Gait,
     Gap,
     Rebooted,
     Segmented,
     Signal,
     StepCounted,
     Tentative,
-    Verdict,
     Walked,
 )
+from service.pipeline.device import Device
+from service.pipeline.lifecycle import State
+from service.pipeline.lineup import Lineup
+from service.pipeline.notices import DeviceChanged, Notice, StateChanged
+from service.pipeline.supervisor import Supervisor
+from service.samples import Band, DeviceInfo, Gait, Verdict
 from service.signals.hosttime import Drift
 from service.signals.rate import Rate
 

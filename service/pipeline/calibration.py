@@ -14,10 +14,11 @@ from typing import Any, Final
 from service.counters import registry
 from service.counters.learning import Lesson, Method
 from service.errors import CounterError, LearningError, NotNowError, ParameterError
+from service.events import Gap, Gridded, Rebooted
 from service.pipeline.lifecycle import State as LinkState
 from service.pipeline.lineup import CounterChoice
 from service.pipeline.notices import Notice, StateChanged
-from service.samples import GRID_HZ, Gap, Gridded, Rebooted, SampleBlock
+from service.samples import GRID_HZ, SampleBlock
 
 LONGEST_S: Final = 600.0
 """Of a recording: ten minutes, at most 3 MB."""

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from service.errors import StoreError, StoreFault
-from service.samples import DeviceInfo, Heard, Received
+from service.events import Heard, Received
+from service.samples import DeviceInfo
 from service.store.chunker import Chunker
 from service.store.joined import joined
 from service.store.values import (

@@ -6,8 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, Final
 
-from service.pipeline.lifecycle import State
-from service.samples import (
+from service.events import (
     Awaited,
     Corrected,
     Counting,
@@ -24,6 +23,7 @@ from service.samples import (
     Tentative,
     Walked,
 )
+from service.pipeline.lifecycle import State
 from service.store.values import LogEntry, Note
 
 

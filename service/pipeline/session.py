@@ -14,25 +14,24 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from service.errors import LinkError
-from service.links.contract import Link
-from service.pipeline.journal import Journal, RestartPoint
-from service.pipeline.lifecycle import State
-from service.pipeline.lineup import Lineup
-from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told, entry_of
-from service.samples import (
+from service.events import (
     Described,
     Event,
     Gap,
     Gridded,
     Heard,
-    Packet,
-    RawBlock,
     Rebooted,
     Received,
     StepCounted,
     Tentative,
     Walked,
 )
+from service.links.contract import Link
+from service.pipeline.journal import Journal, RestartPoint
+from service.pipeline.lifecycle import State
+from service.pipeline.lineup import Lineup
+from service.pipeline.notices import UNNUMBERED, DeviceChanged, Notice, StateChanged, Told, entry_of
+from service.samples import Packet, RawBlock
 from service.signals.hosttime import Drift, HostClock
 from service.store.chunker import blocks
 from service.store.codec import parted

@@ -14,9 +14,9 @@ from enum import StrEnum
 from typing import Final
 
 from service.errors import NotNowError
+from service.events import Counting, Gap, Rebooted, Segmented, StepCounted
 from service.pipeline.lifecycle import State as LinkState
 from service.pipeline.notices import Notice, StateChanged
-from service.samples import Counting, Gap, Rebooted, Segmented, StepCounted
 
 TRUE_STEPS_MAX: Final = 100_000
 """A day's walk and more."""

@@ -34,7 +34,8 @@ from collections.abc import MutableSequence
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 from typing import Any, Final
 
-from service.samples import GRID_HZ, Heading, SampleBlock
+from service.events import Heading
+from service.samples import GRID_HZ, SampleBlock
 from service.signals import orientation
 from service.signals.orientation import DT_S
 

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from service.samples import GRID_HZ, TICK_EVERY, TICK_HZ, Columns, Gap, RawBlock, SampleBlock
+from service.events import Gap
+from service.samples import GRID_HZ, TICK_EVERY, TICK_HZ, Columns, RawBlock, SampleBlock
 from service.signals import grid
 from service.signals.compiled import compiled
 from service.signals.rate import Rate, RateSpan

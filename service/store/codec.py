@@ -13,7 +13,8 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from service.samples import TICK_EVERY, Heading, Step, StepCounted
+from service.events import Heading, StepCounted
+from service.samples import TICK_EVERY, Step
 from service.store.values import SAMPLE_BYTES, Chunk, LogEntry, Note, stretches
 
 STEP: Final = "step"

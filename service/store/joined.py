@@ -6,7 +6,8 @@ import dataclasses
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 
-from service.samples import TICK_EVERY, Columns, Received
+from service.events import Received
+from service.samples import TICK_EVERY, Columns
 
 Arrived = tuple[Received, int]
 """Samples, and the host time (UTC, ns) at which they arrived."""

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from service.errors import StoreError, StoreFault
-from service.samples import StepCounted
+from service.events import StepCounted
 from service.store import codec
 from service.store.values import Batch, Chunk, Cursor, Description, LogEntry, SessionKey, Snapshot
 

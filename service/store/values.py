@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.errors import ParameterError
-from service.samples import TICK_EVERY, StepCounted
+from service.events import StepCounted
+from service.samples import TICK_EVERY
 
 SAMPLE_BYTES = 6
 """One sample of one sensor: three i16."""

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import inf
 
-from service.samples import Event, StepCounted, Tentative
+from service.events import Event, StepCounted, Tentative
 
 
 class Account:

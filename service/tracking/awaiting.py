@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.samples import Awaited, Corrected
+from service.events import Awaited, Corrected
 from service.tracking.account import Account
 from service.tracking.holes import Span
 from service.tracking.kept import Kept

@@ -22,7 +22,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, Final
 
-from service.samples import Described, DeviceInfo, Event, Heard, Packet, RawBlock, Received, Reply
+from service.events import Described, Event, Heard, Received
+from service.samples import DeviceInfo, Packet, RawBlock, Reply
 from service.tracking.awaiting import awaited
 from service.tracking.behind import SLICE_SAMPLES, Behind
 from service.tracking.cutting import cut

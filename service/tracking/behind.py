@@ -12,7 +12,8 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import Final
 
-from service.samples import Counting, DeviceInfo, Event, RawBlock, Segmented, Signal, StepCounted, Tentative
+from service.events import Counting, Event, Segmented, Signal, StepCounted, Tentative
+from service.samples import DeviceInfo, RawBlock
 from service.tracking.account import Account
 from service.tracking.awaiting import corrections
 from service.tracking.cutting import cut

@@ -13,26 +13,18 @@ from typing import Any, Final
 
 from service.counters.contract import StepCounter
 from service.errors import CounterError
-from service.samples import (
-    GRID_HZ,
+from service.events import (
     Counting,
-    DeviceInfo,
     Event,
-    Gait,
     Gridded,
-    Likely,
-    RawBlock,
     Rebooted,
     Segmented,
-    Sensors,
     Signal,
-    Step,
     StepCounted,
     Tentative,
-    Update,
-    Verdict,
     Walked,
 )
+from service.samples import GRID_HZ, DeviceInfo, Gait, Likely, RawBlock, Sensors, Step, Update, Verdict
 from service.signals.heading import WalkingDirection
 from service.signals.rate import Rate
 from service.signals.timebase import Timebase

@@ -11,7 +11,8 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from service.samples import Likely, Step, Tentative
+from service.events import Tentative
+from service.samples import Likely, Step
 
 _LONGEST_S = 2.0
 """A longer time since the step before is a pause, not an interval."""

@@ -12,7 +12,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from service.samples import Described, Event, Packet, RawBlock
+from service.events import Described, Event
+from service.samples import Packet, RawBlock
 from service.tracking.fitness import Stream
 from service.tracking.fold import CounterFactory, Fold
 from service.tracking.intake import Booted, Intake, Said

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final, TypeGuard
 
-from service.samples import Gait, Verdict, Walked
+from service.events import Walked
+from service.samples import Gait, Verdict
 
 FRAME_S: Final = 1.0
 """Two verdicts further apart are not of frames that follow each other: there is a gap between them."""

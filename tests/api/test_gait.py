@@ -16,7 +16,7 @@ from device_sim.gait import Walker
 from service.api import models
 from service.api.views import event_view
 from service.counters import registry
-from service.samples import Counting, Walked
+from service.events import Counting, Walked
 
 MESSAGE = TypeAdapter(models.LiveMessage)
 pytestmark = pytest.mark.usefixtures("gate")

@@ -7,8 +7,9 @@ import numpy as np
 
 from service.counters import registry
 from service.evaluation.counting import raw_block
+from service.events import StepCounted
 from service.recordings import stated_rate_hz
-from service.samples import TICK_EVERY, TICK_HZ, DeviceInfo, Packet, RawBlock, StepCounted
+from service.samples import TICK_EVERY, TICK_HZ, DeviceInfo, Packet, RawBlock
 from service.tracking.tracker import Tracker
 
 RATE, DATA = "rate", "data"

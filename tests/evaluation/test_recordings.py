@@ -13,8 +13,9 @@ from device_sim.bracelet import Bracelet
 from device_sim.source import RecordingSource
 from service.counters import double_threshold, registry
 from service.evaluation.counting import count, grid_block, sensors
+from service.events import StepCounted
 from service.recordings import read, stated_rate_hz
-from service.samples import Packet, RawBlock, StepCounted
+from service.samples import Packet, RawBlock
 from service.signals.timebase import Timebase
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire

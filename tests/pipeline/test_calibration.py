@@ -13,12 +13,13 @@ from pipeline.stand import Stand
 from service.counters import gyro_zero_crossing
 from service.counters.double_threshold import TUNED, middle_window, sampled_window
 from service.errors import CounterError, NotNowError, ParameterError, UnknownNumberError
+from service.events import Gap, Gridded, Rebooted, Segmented
 from service.pipeline import calibrations
 from service.pipeline.calibration import LONGEST_S, Calibration, Plan, State
 from service.pipeline.lifecycle import State as LinkState
 from service.pipeline.lineup import CounterChoice, lineup
 from service.pipeline.notices import Notice, StateChanged
-from service.samples import Gap, Gridded, Packet, Rebooted, SampleBlock, Segmented, Sensor
+from service.samples import Packet, SampleBlock, Sensor
 from service.wearables import bracelet as wire
 
 DOUBLE = CounterChoice(name="double_threshold")

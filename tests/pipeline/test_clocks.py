@@ -14,8 +14,9 @@ from fakes import EVERY, MetronomeCounter, data_packets, described
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters import registry
+from service.events import Gap, StepCounted, Tentative
 from service.pipeline.session import Session
-from service.samples import GRID_HZ, Gap, Packet, StepCounted, Tentative
+from service.samples import GRID_HZ, Packet
 from service.tracking.backfill import BackfillTracker
 from service.wearables import bracelet as wire
 

@@ -20,9 +20,10 @@ from waiting import waiting
 from device_sim.air_tcp import RemoteAir
 from service.api.server import spare_what_is_loaded
 from service.counters import registry
+from service.events import StepCounted
 from service.pipeline.journal import Journal
 from service.pipeline.session import Session
-from service.samples import ACCELEROMETER_ONLY, Sensor, StepCounted
+from service.samples import ACCELEROMETER_ONLY, Sensor
 from service.store.store import open_store
 from service.tracking.requests import Missing
 

@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
+from service.events import Counting
 from service.pipeline.hub import Hub, SlowSubscriberError
 from service.pipeline.lifecycle import State
 from service.pipeline.notices import Notice, StateChanged
-from service.samples import Counting
 
 
 def durable(ordinal, device="a"):

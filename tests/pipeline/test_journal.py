@@ -6,8 +6,9 @@ import time
 import pytest
 
 from service.errors import StoreError, StoreFault
+from service.events import Received
 from service.pipeline.journal import HELD_CHUNKS, Journal, RestartPoint
-from service.samples import DeviceInfo, RawBlock, Received
+from service.samples import DeviceInfo, RawBlock
 from service.store.values import Cursor, LogEntry, LogPage, LogQuery, Note, SessionKey
 
 INFO = DeviceInfo(device="dev-1", boot=1, rate_hz=50.0, lsb_per_g=4096.0)

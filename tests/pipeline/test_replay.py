@@ -3,9 +3,9 @@
 import pytest
 import waiting
 
+from service.events import StepCounted
 from service.pipeline.journal import Journal
 from service.pipeline.session import Session
-from service.samples import StepCounted
 from service.store.store import open_store
 from service.store.values import LogQuery
 from service.tracking.requests import Missing

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 from fakes import MetronomeCounter, data_packet, data_packets, described
 
+from service.events import Gap, Gridded, Rebooted, StepCounted
 from service.pipeline.lineup import lineup
 from service.pipeline.notices import DeviceChanged
 from service.pipeline.session import Session
-from service.samples import GRID_HZ, Gap, Gridded, Rebooted, Sensor, Step, StepCounted, Update
+from service.samples import GRID_HZ, Sensor, Step, Update
 from service.tracking.backfill import BackfillTracker
 from service.wearables import bracelet as wire
 

@@ -9,11 +9,11 @@ from pipeline.radio import on_radio, walking
 from pipeline.test_roster import made
 
 from device_sim.peripheral import static_address
+from service.events import StepCounted
 from service.links.ble import Backend
 from service.pipeline.device import TWIN_WAIT_S
 from service.pipeline.lifecycle import State
 from service.pipeline.notices import StateChanged
-from service.samples import StepCounted
 
 FAST = {"speed": 8.0}
 

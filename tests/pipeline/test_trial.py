@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pipeline.stand import START_NS, Stand
 
 from service.errors import NotNowError, ParameterError, UnknownNumberError
+from service.events import Counting, Gap, Rebooted, Segmented, StepCounted
 from service.pipeline import trials as trials_module
 from service.pipeline.lifecycle import State as LinkState
 from service.pipeline.lineup import lineup
@@ -19,7 +20,7 @@ from service.pipeline.notices import Notice, StateChanged
 from service.pipeline.trial import Cause, Count, Entry, Finish, State, Trial, advance, mean
 from service.pipeline.trial_table import COLUMNS, table_csv
 from service.pipeline.trials import Trials
-from service.samples import Counting, Gap, Rebooted, Segmented, Step, StepCounted
+from service.samples import Step
 
 S = 1_000_000_000
 

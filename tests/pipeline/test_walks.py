@@ -3,10 +3,10 @@
 import pytest
 from fakes import GateCounter, MetronomeCounter, data_packets, described
 
+from service.events import StepCounted, Walked
 from service.pipeline.journal import Journal
 from service.pipeline.notices import notice_of
 from service.pipeline.session import Session
-from service.samples import StepCounted, Walked
 from service.store.store import open_store
 from service.store.values import LogQuery
 from service.tracking.backfill import BackfillTracker

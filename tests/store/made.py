@@ -4,7 +4,8 @@ import random
 
 import numpy as np
 
-from service.samples import Step, StepCounted
+from service.events import StepCounted
+from service.samples import Step
 from service.store.chunker import counts
 from service.store.values import Batch, Chunk, Cursor, Layout, LogEntry, Note, SessionKey, Snapshot, stretches
 

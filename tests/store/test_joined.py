@@ -3,7 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.samples import TICK_EVERY, RawBlock, Received
+from service.events import Received
+from service.samples import TICK_EVERY, RawBlock
 from service.store.chunker import Chunker
 from service.store.joined import joined
 from service.store.values import Layout

@@ -11,7 +11,8 @@ from store import made
 
 from device_sim.gait import Walker
 from service.counters import registry
-from service.samples import TICK_EVERY, Packet, StepCounted
+from service.events import StepCounted
+from service.samples import TICK_EVERY, Packet
 from service.store import codec
 from service.store.chunker import Chunker, by_stretch
 from service.store.store import open_store

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from store import made
 
-from service.samples import Heading, Step, StepCounted
+from service.events import Heading, StepCounted
+from service.samples import Step
 from service.store import codec, database
 from service.store.reader import Reader
 from service.store.schema import MIGRATIONS

@@ -24,7 +24,7 @@ from waiting import (
     waiting,
 )
 
-from service.samples import (
+from service.events import (
     Awaited,
     Corrected,
     Counting,

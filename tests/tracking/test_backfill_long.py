@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from waiting import Device, check_order, fold_state, heal, plain, run, steps_of, storm, waiting
 
 from service.counters import registry
-from service.samples import Awaited, Corrected, Gap, Heard, Rebooted, Received, Sensor, StepCounted
+from service.events import Awaited, Corrected, Gap, Heard, Rebooted, Received, StepCounted
+from service.samples import Sensor
 
 pytestmark = pytest.mark.full
 

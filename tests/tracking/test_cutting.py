@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters import registry
-from service.samples import Packet, Rebooted, Sensor, StepCounted
+from service.events import Rebooted, StepCounted
+from service.samples import Packet, Sensor
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 

@@ -8,7 +8,8 @@ from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.samples import Sensor, StepCounted
+from service.events import StepCounted
+from service.samples import Sensor
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from device_sim.bracelet import Bracelet
 from device_sim.gait import Walker
 from service.counters.registry import BESIDE, DEFAULT, make
-from service.samples import DeviceInfo, Packet, RawBlock, Step, StepCounted, Tentative
+from service.events import StepCounted, Tentative
+from service.samples import DeviceInfo, Packet, RawBlock, Step
 from service.tracking.tentative import TentativeSteps
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire

@@ -8,18 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.errors import CounterError, ParameterError
-from service.samples import (
-    GRID_HZ,
-    Counting,
-    Described,
-    Gap,
-    Packet,
-    Rebooted,
-    Segmented,
-    Signal,
-    StepCounted,
-    Tentative,
-)
+from service.events import Counting, Described, Gap, Rebooted, Segmented, Signal, StepCounted, Tentative
+from service.samples import GRID_HZ, Packet
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 

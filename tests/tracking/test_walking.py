@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from waiting import HISTORY, Device, Keeping, fold_state, heal, heard, makers, plain, run, storm, waiting
 
 from service.errors import CounterError
-from service.samples import Counting, Gait, Rebooted, Segmented, StepCounted, Verdict, Walked
+from service.events import Counting, Rebooted, Segmented, StepCounted, Walked
+from service.samples import Gait, Verdict
 from service.tracking.backfill import BackfillTracker
 from service.tracking.tracker import Tracker
 from service.tracking.walking import Walking

@@ -10,7 +10,8 @@ from fakes import EVERY, MetronomeCounter, data_packet, data_packets, described
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.samples import GRID_HZ, TICK_EVERY, Gap, Packet, Rebooted, StepCounted
+from service.events import Gap, Rebooted, StepCounted
+from service.samples import GRID_HZ, TICK_EVERY, Packet
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 

@@ -23,7 +23,8 @@ from service.counters.streaming import COMPILED_FROM
 from service.evaluation.counting import part, streamed
 from service.evaluation.rows import Choice
 from service.evaluation.scorecard.sampled import Sampled, columns, stacked
-from service.samples import TICK_HZ, Gridded, Packet, SampleBlock, Sensor
+from service.events import Gridded
+from service.samples import TICK_HZ, Packet, SampleBlock, Sensor
 from service.tracking.tracker import Tracker
 from service.wearables import bracelet as wire
 
