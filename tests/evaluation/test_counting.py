@@ -49,13 +49,28 @@ def test_at_50_hz_the_grid_is_the_file():
     assert np.array_equal(np.column_stack(grid_block(made).acc_g), made.acc_g)
 
 
+RECORDED = given(st.integers(0, 1000), st.floats(0.3, 8), st.sampled_from([12.5, 25, 31.25, 50, 52.083333, 100]))
+
+
 @settings(max_examples=8)
-@given(st.integers(0, 1000), st.floats(0.3, 8), st.sampled_from([12.5, 25, 31.25, 50, 52.083333, 100]))
+@RECORDED
 def test_packets_plain_python_and_numba_give_the_same_steps(seed, seconds, rate_hz):
+    check_alike([variant for variant in VARIANTS if variant[0] != "steplink"], seed, seconds, rate_hz)
+
+
+@pytest.mark.full  # numba takes seven seconds to compile it
+@settings(max_examples=8)
+@RECORDED
+def test_packets_plain_python_and_numba_give_the_same_steps_of_steplink(seed, seconds, rate_hz):
+    check_alike([variant for variant in VARIANTS if variant[0] == "steplink"], seed, seconds, rate_hz)
+
+
+def check_alike(variants, seed, seconds, rate_hz):
     made = jittered(seed, seconds, rate_hz)
     assume(median_rate_hz(made.t_s) >= MIN_RATE_HZ)  # of a few samples most may come late
-    live = live_steps(made, VARIANTS, n=1 + seed % 30)
-    for variant in VARIANTS:
+    assert variants
+    live = live_steps(made, variants, n=1 + seed % 30)
+    for variant in variants:
         for fast in (True, False):
             assert count(made, *variant, fast=fast).step_t_s.tolist() == live[variant]
 
