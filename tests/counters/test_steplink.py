@@ -232,3 +232,13 @@ def test_a_frame_that_waited_too_long_proves_nothing_any_more():
     assert s[bouts.TOP] < s[bouts.HIGH]
     assert s[bouts.PROOF] < p.evidence
     assert s[bouts.WALKING] == 0.0
+
+
+def test_a_step_is_off_by_no_more_than_it_says_at_any_cadence():
+    b0, a1, a2 = front.fresh()[front.LOW : front.LOW + 3]
+    hz = np.linspace(rhythm.SLOWEST_HZ, rhythm.FASTEST_HZ, 50)
+    turn = np.exp(-2j * np.pi * hz / GRID_HZ)
+    response = b0 * (1 + 2 * turn + turn**2) / (1 + a1 * turn + a2 * turn**2)
+    lag_s = -np.angle(response) / (2 * np.pi * hz)
+    off_s = np.abs(lag_s - steplink.FILTER_DELAY / GRID_HZ)
+    assert 0.5 * steplink.TIME_ERROR_S < off_s[hz < 3.8].max() <= steplink.TIME_ERROR_S
